@@ -1,0 +1,85 @@
+"""What all compiled code shares: flags, verbs of the models, vectorisable minimum and maximum."""
+
+import inspect
+
+import numpy as np
+from llvmlite import ir
+from numba import types
+from numba.extending import intrinsic, overload
+
+# Without "nnan" and "ninf": those would let the compiler remove every test for a non-finite number.
+FASTMATH = {"nsz", "arcp", "contract", "afn", "reassoc"}
+
+# NumPy's error model: with Python's check for division by zero no loop would vectorise.
+FLAGS = {"fastmath": FASTMATH, "error_model": "numpy"}
+
+# Options of every compiled function: @njit(**COMPILED). None is compiled with parallel=True: passes
+# release the interpreter's lock and run over ranges of blocks on Python threads (sph/threads.py),
+# which costs no second compilation and takes nested models.
+COMPILED = {"cache": True, "nogil": True, **FLAGS}
+
+
+def verb(stub):
+    """Make `stub(model, ...)` resolve at compile time to the method of that name of the model's class.
+
+    A model (kernel, equation of state, viscosity) is a NamedTuple whose methods are its formulas:
+    called from Python they work on NumPy arrays, called from compiled code they are inlined.
+    The method's parameters must have the stub's names. A new model is a new class, nothing else.
+    """
+    name = stub.__name__
+    parameters = list(inspect.signature(stub).parameters)
+
+    def pick(self, *_):
+        return getattr(self.instance_class, name) if isinstance(self, types.BaseNamedTuple) else None
+
+    # Numba compares the names of the parameters, so the function it gets must have the stub's own.
+    source = f"lambda {', '.join(parameters)}: pick({', '.join(parameters)})"
+    overload(stub, jit_options=FLAGS)(eval(source, {"pick": pick}))
+    return stub
+
+
+def _fast_binary(llvm_name: str):
+    """An intrinsic for llvm.maxnum or llvm.minnum with all fast flags.
+
+    Python's max() carries rules for NaN that stop LLVM from vectorising a reduction over it.
+    """
+
+    @intrinsic
+    def operation(typingctx, a, b):
+        if not (isinstance(a, types.Float) and a == b):
+            return None
+
+        def generate(context, builder, signature, arguments):
+            kind = arguments[0].type
+            function = builder.module.declare_intrinsic(
+                llvm_name, [kind], ir.FunctionType(kind, [kind, kind])
+            )
+            return builder.call(function, arguments, fastmath=("fast",))
+
+        return a(a, b), generate
+
+    return operation
+
+
+_maxnum = _fast_binary("llvm.maxnum")
+_minnum = _fast_binary("llvm.minnum")
+
+
+def larger(a, b):
+    """The larger of two numbers of the same type (undefined for NaN), or elementwise in NumPy."""
+    return np.maximum(a, b)
+
+
+def smaller(a, b):
+    """The smaller of two numbers of the same type (undefined for NaN), or elementwise in NumPy."""
+    return np.minimum(a, b)
+
+
+@overload(larger, jit_options=FLAGS)
+def _larger(a, b):
+    return lambda a, b: _maxnum(a, b)
+
+
+@overload(smaller, jit_options=FLAGS)
+def _smaller(a, b):
+    return lambda a, b: _minnum(a, b)

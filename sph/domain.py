@@ -1,0 +1,84 @@
+"""The box, its boundaries, and the images of particles that stand for them.
+
+An image is an affine map per axis, x -> sign x + offset: a periodic boundary is an offset, a
+reflecting wall a sign and an offset. Velocities take the sign. The pair loops know nothing else.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import product
+from typing import NamedTuple
+
+import numpy as np
+
+from sph.errors import NumericalError
+
+
+class Images(NamedTuple):
+    """K maps of the domain; the first is the identity."""
+
+    sign: np.ndarray  # (K, D)
+    offset: np.ndarray  # (K, D)
+
+
+@dataclass(frozen=True)
+class Domain:
+    """`box` (D, 2): lower and upper end of each axis; `boundaries`: "periodic", "mirror" or "open"."""
+
+    box: np.ndarray
+    boundaries: tuple[str, ...]
+
+    @cached_property
+    def images(self) -> Images:
+        """The identity and every image that can reach into the box from one box length away."""
+        per_axis = [
+            _axis_images(lo, hi, boundary)
+            for (lo, hi), boundary in zip(self.box, self.boundaries, strict=True)
+        ]
+        combined = list(product(*per_axis))
+        sign = np.array([[one[0] for one in image] for image in combined])
+        offset = np.array([[one[1] for one in image] for image in combined])
+        return Images(sign, offset)
+
+    def bring_inside(self, position, velocities) -> None:
+        """Wrap periodic axes and reflect at walls, in place.
+
+        position (D, N); velocities: arrays (D, N) whose component changes sign in a reflection.
+        """
+        for axis, ((lo, hi), boundary) in enumerate(zip(self.box, self.boundaries, strict=True)):
+            x = position[axis]
+            outside = np.flatnonzero((x < lo) | (x >= hi))
+            if boundary == "open" or outside.size == 0:
+                continue
+            if boundary == "periodic":
+                length = hi - lo
+                x[outside] -= length * np.floor((x[outside] - lo) / length)
+                # a coordinate just below lo may round up to hi itself
+                x[outside] = np.where(x[outside] >= hi, lo, x[outside])
+            else:
+                beyond = outside[x[outside] != hi]
+                x[beyond] = np.where(x[beyond] < lo, 2 * lo, 2 * hi) - x[beyond]
+                for velocity in velocities:
+                    velocity[axis, beyond] *= -1
+
+    def check_reach(self, reach: float, particle: int) -> None:
+        """Raise NumericalError where a kernel's support is wider than the box.
+
+        Each boundary has one image on either side, which serves supports up to one box length.
+        """
+        for axis, ((lo, hi), boundary) in enumerate(zip(self.box, self.boundaries, strict=True)):
+            if boundary != "open" and reach > hi - lo:
+                raise NumericalError(
+                    f"particle {particle} needs a kernel support of {reach:.4g}, wider than the "
+                    f"{boundary} box along {'xyz'[axis]} ({hi - lo:.4g}).\n"
+                    "Try: more particles, a smaller physics.eta, or a wider domain along that axis."
+                )
+
+
+def _axis_images(lo: float, hi: float, boundary: str) -> list[tuple[float, float]]:
+    """(sign, offset) of the images along one axis, the identity first."""
+    if boundary == "periodic":
+        return [(1.0, 0.0), (1.0, hi - lo), (1.0, lo - hi)]
+    if boundary == "mirror":
+        return [(1.0, 0.0), (-1.0, 2 * lo), (-1.0, 2 * hi)]
+    return [(1.0, 0.0)]

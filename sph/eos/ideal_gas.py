@@ -1,0 +1,20 @@
+"""Ideal gas of constant adiabatic index (seed eqs 19-20)."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+
+class Model(NamedTuple):
+    """`gamma`: adiabatic index, the ratio of specific heats, above 1."""
+
+    gamma: float
+
+    def pressure(self, density, internal_energy):
+        return (self.gamma - 1.0) * density * internal_energy  # eq 19
+
+    def sound_speed(self, density, pressure):
+        return np.sqrt(self.gamma * pressure / density)  # eq 20
+
+    def internal_energy(self, density, pressure):
+        return pressure / ((self.gamma - 1.0) * density)

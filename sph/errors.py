@@ -1,0 +1,31 @@
+"""Errors a user meets: a message that says what to do, and the exit code of the program."""
+
+
+class SphError(Exception):
+    """Shown as its message alone, without a traceback."""
+
+    exit_code = 1
+
+
+class ConfigError(SphError):
+    """The configuration or the command line is wrong."""
+
+    exit_code = 2
+
+
+class NumericalError(SphError):
+    """The run came to numbers that mean nothing."""
+
+    exit_code = 3
+
+
+class FileError(SphError):
+    """A file or directory is missing, not what it should be, or cannot be written."""
+
+    exit_code = 4
+
+
+class Stopped(SphError):
+    """The run stopped early and left a checkpoint that can be restarted."""
+
+    exit_code = 75

@@ -1,0 +1,1 @@
+"""Time integration: the leapfrog of the seed and its step."""

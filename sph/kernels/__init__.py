@@ -1,0 +1,52 @@
+"""Smoothing kernels: W(r, H) = H^-D w(r/H) with compact support r < H (seed eq 9).
+
+A kernel is a file whose `Model` is a NamedTuple with these methods, all free of branches so that
+the pair loop vectorises. `dim` is any tuple of length D, `q` = r/H >= 0; w and its derivative come
+without the normalisation C, which a loop applies once a particle.
+
+    normalisation(dim)      C, such that the integral of C w over space is 1
+    w(dim, q)               w(q) / C, zero for q >= 1
+    dw_over_q(dim, q)       (dw/dq) / (q C): finite at q = 0 where the kernel is smooth
+    force_over_q(dim, q)    the same, as it enters the pair force (eqs 22-23)
+"""
+
+import numpy as np
+
+from sph import registry
+from sph.compiled import verb
+
+
+@verb
+def normalisation(self, dim):
+    return self.normalisation(dim)
+
+
+@verb
+def w(self, dim, q):
+    return self.w(dim, q)
+
+
+@verb
+def dw_over_q(self, dim, q):
+    return self.dw_over_q(dim, q)
+
+
+@verb
+def force_over_q(self, dim, q):
+    return self.force_over_q(dim, q)
+
+
+def support_ratio(kernel, dimension: int) -> float:
+    """H/h = 1/(2 sigma), sigma the kernel's standard deviation per axis (Dehnen & Aly 2012, eq 8)."""
+    dim = (0,) * dimension
+    # 40 nodes on either side of q = 1/2 integrate any piecewise polynomial used here exactly.
+    node, weight = np.polynomial.legendre.leggauss(40)
+    q = np.concatenate([(node + 1) / 4, (node + 3) / 4])
+    shell = np.tile(weight / 4, 2) * q ** (dimension - 1) * kernel.w(dim, q)
+    variance = np.sum(shell * q**2) / np.sum(shell) / dimension
+    return float(1 / (2 * np.sqrt(variance)))
+
+
+def make(name: str, **parameters):
+    """The kernel of that name, e.g. make("cubic_spline", flattened=True)."""
+    return registry.model_class("sph.kernels", name)(**parameters)

@@ -1,0 +1,41 @@
+"""Cubic spline kernel (appendix of the seed's draft; Monaghan & Lattanzio 1985)."""
+
+import math
+from typing import NamedTuple
+
+from sph.compiled import larger
+
+
+class Model(NamedTuple):
+    """`flattened`: in the force, keep the gradient below q = 1/3 at its value there.
+
+    (Thomas & Couchman 1992: particles at small separation still repel.) It enters eqs 22-23 only.
+    """
+
+    flattened: bool = False
+
+    def normalisation(self, dim):
+        if len(dim) == 1:
+            return 4 / 3
+        return 40 / (7 * math.pi) if len(dim) == 2 else 8 / math.pi
+
+    def w(self, dim, q):
+        u = larger(1.0 - q, 0.0 * q)
+        v = larger(0.5 - q, 0.0 * q)
+        return 2.0 * u * u * u - 8.0 * v * v * v
+
+    def dw_over_q(self, dim, q):
+        # 18 q - 12 below q = 1/2 and -6 (1 - q)^2 / q above, in one line without cancellation
+        outer = larger(q, 0.0 * q + 0.5)
+        u = larger(1.0 - outer, 0.0 * q)
+        v = larger(0.5 - q, 0.0 * q)
+        return -6.0 * u * u / outer - 18.0 * v
+
+    def force_over_q(self, dim, q):
+        floor = 1 / 3 if self.flattened else 0.0
+        clipped = larger(q, 0.0 * q + floor)
+        outer = larger(clipped, 0.0 * q + 0.5)
+        u = larger(1.0 - outer, 0.0 * q)
+        v = larger(0.5 - clipped, 0.0 * q)
+        # dw/dq at the clipped q, over the true q; 1e-300 only matters where the vector r_ij is zero
+        return (-6.0 * u * u / outer - 18.0 * v) * (clipped / larger(q, 0.0 * q + 1e-300))

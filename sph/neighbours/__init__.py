@@ -1,0 +1,1 @@
+"""Neighbours: order the particles into blocks, box the blocks into a tree, list candidates a block."""

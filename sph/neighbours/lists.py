@@ -1,0 +1,127 @@
+"""Candidate lists: for each block, every particle (or image) that may come within a support of it.
+
+A list serves all particles of its block and lives until some particle has moved, or grown its
+support, by its share of the skin. It is stored as one integer a candidate: particle and image.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+
+from sph.compiled import COMPILED
+from sph.neighbours.order import BLOCK, number_of_blocks
+
+CHUNK = 32  # blocks that share a stretch of the storage
+IMAGE_SHIFT = 26  # low bits of a candidate: the particle; above them the image (27 at most)
+MAX_PARTICLES = 1 << IMAGE_SHIFT
+
+
+class Lists(NamedTuple):
+    """Candidates of block b: candidates[start[b] : start[b] + count[b]]."""
+
+    start: np.ndarray  # (blocks,) int64
+    count: np.ndarray  # (blocks,) int64
+    candidates: np.ndarray  # int32
+
+
+@njit(**COMPILED)
+def _gap(lower_a, upper_a, lower_b, upper_b):
+    """Distance between two intervals, zero where they touch."""
+    return max(0.0, max(lower_b - upper_a, lower_a - upper_b))
+
+
+@njit(**COMPILED)
+def _fill(chunk, tree, position, support, stretch, images, region, start, count, candidates):
+    """List the blocks of one chunk into its region; return how much room they need."""
+    first, last, lower, upper, largest = tree
+    sign, offset = images
+    begin_of_region = region[chunk]
+    room = region[chunk + 1] - begin_of_region
+    D, n = position.shape
+    blocks = start.size
+    nodes_on_stack = np.empty(128, np.int64)
+    box_lower = np.empty(D)
+    box_upper = np.empty(D)
+    needed = 0
+    for block in range(chunk * CHUNK, min((chunk + 1) * CHUNK, blocks)):
+        a, b = block * BLOCK, min((block + 1) * BLOCK, n)
+        H_block = 0.0
+        for p in range(a, b):
+            H_block = max(H_block, support[p])
+        for d in range(D):
+            box_lower[d] = box_upper[d] = position[d, a]
+            for p in range(a + 1, b):
+                box_lower[d] = min(box_lower[d], position[d, p])
+                box_upper[d] = max(box_upper[d], position[d, p])
+        begin = needed
+        for image in range(sign.shape[0]):
+            depth = 1
+            nodes_on_stack[0] = 0
+            while depth > 0:
+                depth -= 1
+                node = nodes_on_stack[depth]
+                squared = 0.0
+                for d in range(D):
+                    s, o = sign[image, d], offset[image, d]
+                    lo = lower[node, d] if s > 0.0 else upper[node, d]
+                    hi = upper[node, d] if s > 0.0 else lower[node, d]
+                    gap = _gap(box_lower[d], box_upper[d], s * lo + o, s * hi + o)
+                    squared += gap * gap
+                reach = stretch * max(H_block, largest[node])
+                if squared >= reach * reach:
+                    continue
+                if last[node] - first[node] > 1:
+                    nodes_on_stack[depth] = 2 * node + 2
+                    nodes_on_stack[depth + 1] = 2 * node + 1
+                    depth += 2
+                    continue
+                for j in range(first[node] * BLOCK, min(last[node] * BLOCK, n)):
+                    squared = 0.0
+                    for d in range(D):
+                        x = sign[image, d] * position[d, j] + offset[image, d]
+                        gap = _gap(box_lower[d], box_upper[d], x, x)
+                        squared += gap * gap
+                    reach = stretch * max(H_block, support[j])
+                    if squared < reach * reach:
+                        if needed < room:
+                            candidates[begin_of_region + needed] = j + (image << IMAGE_SHIFT)
+                        needed += 1
+        start[block] = begin_of_region + begin
+        count[block] = needed - begin
+    return needed
+
+
+@njit(**COMPILED)
+def _fill_chunks(
+    first, last, tree, position, support, stretch, images, region, start, count, candidates, needed
+):
+    for chunk in range(first, last):
+        needed[chunk] = _fill(
+            chunk, tree, position, support, stretch, images, region, start, count, candidates
+        )
+
+
+def build(tree, position, support, skin: float, images, team, room=None):
+    """Lists of all blocks, and the room each chunk of them needed.
+
+    position (D, N) and support (N,) in block order, `tree` built from them; candidates lie
+    within (1 + skin) max(H_block, H_j) of the block's box. `room` (chunks,): what an earlier
+    build needed, to size the storage; where it falls short the build is done once more.
+    """
+    blocks = number_of_blocks(support.size)
+    chunks = (blocks + CHUNK - 1) // CHUNK
+    if room is None or room.size != chunks:
+        room = np.zeros(chunks, np.int64)
+    start = np.empty(blocks, np.int64)
+    count = np.empty(blocks, np.int64)
+    needed = np.empty(chunks, np.int64)
+    while True:
+        # 15 % to spare: lists rebuilt in a developing flow then rarely have to be built twice
+        region = np.concatenate([[0], np.cumsum(room + room // 7 + 64)])
+        candidates = np.empty(region[-1], np.int32)
+        team.run(_fill_chunks, chunks, tree, position, support, 1.0 + skin, images, region, start,
+                 count, candidates, needed)  # fmt: skip
+        if np.all(needed <= np.diff(region)):
+            return Lists(start, count, candidates), needed
+        room = needed.copy()

@@ -1,0 +1,1 @@
+"""Problems: one file each, its `Problem` the keys of [problem], the initial and the exact state."""

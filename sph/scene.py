@@ -1,0 +1,106 @@
+"""A scene: what the configuration asks for, and nothing else, in the form the passes take."""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+from sph import kernels
+from sph.config import Config
+from sph.domain import Domain
+from sph.schemes import grad_h
+from sph.schemes.smoothing import Converged, FixedPasses
+from sph.viscosity import balsara
+
+# Relative tolerance of the converged support: round-off of the density sum is some 1e-14.
+TOLERANCE = 1e-10
+
+
+@dataclass(frozen=True)
+class Scene:
+    """The compiled-in choices of a configuration."""
+
+    config: Config
+
+    @property
+    def dimension(self) -> int:
+        return self.config.problem.dimension
+
+    @cached_property
+    def domain(self) -> Domain:
+        return Domain(self.config.problem.box, self.config.problem.boundaries)
+
+    @cached_property
+    def eos(self):
+        return self.config.physics.eos_model()
+
+    @cached_property
+    def viscosity(self):
+        return self.config.physics.viscosity_model()
+
+    @property
+    def evolves_alpha(self) -> bool:
+        return self.viscosity.evolves
+
+    @property
+    def needs_curl(self) -> bool:
+        return self.config.physics.balsara and self.dimension > 1
+
+    @property
+    def needs_divergence(self) -> bool:
+        return self.config.physics.balsara or self.evolves_alpha
+
+    @cached_property
+    def models(self) -> grad_h.Models:
+        """The models of the density and rate passes."""
+        passes = self.config.physics.density_passes
+        return self._models(Converged(TOLERANCE) if passes == "converged" else FixedPasses(passes))
+
+    @cached_property
+    def starting_models(self) -> grad_h.Models:
+        """The same, but with converged supports: what a run begins with."""
+        return self._models(Converged(TOLERANCE))
+
+    def _models(self, smoothing) -> grad_h.Models:
+        physics = self.config.physics
+        kernel = physics.kernel_model()
+        return grad_h.Models(
+            kernel=kernel,
+            smoothing=smoothing,
+            eos=self.eos,
+            viscosity=self.viscosity,
+            balsara=balsara.Model() if physics.balsara else None,
+            support_ratio=kernels.support_ratio(kernel, self.dimension),
+            eta=float(physics.eta),
+        )
+
+    def parts(self) -> tuple[list[str], list[str]]:
+        """What is compiled in, and what was left out and why, in words."""
+        physics = self.config.physics
+        kernel = self.models.kernel
+        name = type(kernel).__module__.rsplit(".", 1)[-1]
+        flattened = ", gradient flattened" if getattr(kernel, "flattened", False) else ""
+        inside = [
+            f"{self.dimension}-D, {len(self.domain.images.sign)} image(s) of the box",
+            f"scheme {physics.scheme}, kernel {name}{flattened}",
+            f"equation of state {type(self.eos).__module__.rsplit('.', 1)[-1]}",
+            "supports converged to 1e-10"
+            if physics.density_passes == "converged"
+            else f"{physics.density_passes} density pass(es)",
+        ]
+        outside = []
+
+        def part(there: bool, what: str, why_not: str):
+            if there:
+                inside.append(what)
+            else:
+                outside.append(f"{what}: {why_not}")
+
+        part(self.evolves_alpha, "equation for alpha", "alpha is one number")
+        part(physics.balsara, "Balsara factor", "physics.balsara = false")
+        part(self.needs_divergence, "divergence of velocity", "neither Balsara nor alpha asks for it")
+        part(
+            self.needs_curl,
+            "curl of velocity",
+            "no curl in 1-D" if self.dimension == 1 else "no Balsara factor asks for it",
+        )
+        part(physics.energy_limit, "time step limit u/|du/dt|", "physics.energy_limit = false")
+        return inside, outside

@@ -1,0 +1,1 @@
+"""Schemes: how density and rates follow from the particles. One file each."""

@@ -1,0 +1,278 @@
+"""The simulation: steps 1-9 of the seed, in its order, on whatever the scene has."""
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+
+from sph.clock import Clock
+from sph.compiled import COMPILED
+from sph.errors import NumericalError
+from sph.integrators import leapfrog, step_size
+from sph.neighbours.order import BLOCK, number_of_blocks
+from sph.neighbours.search import Origin, Search, first_guess
+from sph.particles import Particles
+from sph.scene import Scene
+from sph.schemes import grad_h
+from sph.threads import Team
+
+# Each widening lists to at least the radius that was asked for, which grows by 2 at the most.
+MAX_WIDENINGS = 60
+
+
+class Totals(NamedTuple):
+    """Sums and extremes over all particles."""
+
+    kinetic_energy: float
+    internal_energy: float
+    momentum: np.ndarray  # (D,)
+    min_density: float
+    max_density: float
+    min_internal_energy: float
+    max_internal_energy: float
+
+    @property
+    def energy(self) -> float:
+        return self.kinetic_energy + self.internal_energy
+
+
+@njit(**COMPILED)
+def _totals(mass, velocity, energy, density):
+    D, n = velocity.shape
+    momentum = np.zeros(D)
+    kinetic = internal = 0.0
+    lowest_density = lowest_energy = np.inf
+    highest_density = highest_energy = -np.inf
+    for d in range(D):
+        along = squares = 0.0
+        for i in range(n):
+            along += mass[i] * velocity[d, i]
+            squares += mass[i] * velocity[d, i] ** 2
+        momentum[d] = along
+        kinetic += 0.5 * squares
+    for i in range(n):
+        internal += mass[i] * energy[i]
+        lowest_energy = min(lowest_energy, energy[i])
+        highest_energy = max(highest_energy, energy[i])
+        lowest_density = min(lowest_density, density[i])
+        highest_density = max(highest_density, density[i])
+    return (
+        kinetic, internal, momentum, lowest_density, highest_density, lowest_energy, highest_energy
+    )  # fmt: skip
+
+
+class Simulation:
+    """Particles and the means to move them on.
+
+    Attributes of use to others: particles, time, step (steps taken), limit (the coming step and
+    what sets it), totals, scene, search.origin, clock.
+    """
+
+    def __init__(self, scene: Scene, particles: Particles, threads: int, clock: Clock):
+        self.scene = scene
+        self.particles = particles
+        self.clock = clock
+        self.team = Team(threads)
+        self.search = Search(scene.domain, self.team)
+        self.time = 0.0
+        self.step = 0
+        self.limit = None
+        self.totals = None
+        n, blocks = particles.number, number_of_blocks(particles.number)
+        self._dim = (0,) * scene.dimension
+        self._support = np.zeros(n)
+        self._velocity = np.empty_like(particles.velocity)  # full-step predictions (eqs 4-6)
+        self._energy = np.empty(n)
+        self._alpha = np.empty(n) if scene.evolves_alpha else None
+        self._pressure_term = np.empty(n)
+        self._sound_speed = np.empty(n)
+        self._signal_speed = np.empty(n)
+        self._wanted = np.empty(blocks)
+        self._div_v = np.empty(n) if scene.needs_divergence else None
+        self._curl_v = np.empty(n) if scene.needs_curl else None
+        self._balsara = np.empty(n) if scene.config.physics.balsara else None
+
+    @classmethod
+    def start(cls, scene: Scene, threads: int, clock: Clock) -> "Simulation":
+        """From the problem's initial state: converged supports, rates, and the first step's size."""
+        with clock.phase("initial state"):
+            initial = scene.config.problem.initial(scene.eos)
+            alpha = float(scene.viscosity.start()) if scene.evolves_alpha else None
+            particles = Particles.at_start(*initial, alpha=alpha)
+        self = cls(scene, particles, threads, clock)
+        self._keep_predictions()
+        self._build_lists(dt=0.0, guess=True)
+        self._density(scene.starting_models)
+        self._rates(scene.starting_models)
+        self._measure()
+        return self
+
+    @classmethod
+    def resume(
+        cls, scene: Scene, particles: Particles, time: float, step: int, next_step: float,
+        origin: Origin, threads: int, clock: Clock,
+    ) -> "Simulation":  # fmt: skip
+        """From a checkpoint, to go on bit for bit as if there had been no stop."""
+        self = cls(scene, particles, threads, clock)
+        self.time, self.step = time, step
+        self.limit = step_size.StepLimit(next_step, 0, "checkpoint")
+        with clock.phase("lists"):
+            self.search.build(origin, particles.id)
+        self.totals = self._sum()
+        return self
+
+    def advance(self, until: float) -> None:
+        """One step (steps 1-9 of the seed), cut where it would pass `until`.
+
+        Raises NumericalError where the new state means nothing.
+        """
+        dt, landing = self.limit.dt, False
+        # a remainder of a billionth of a step is rounding, not a step
+        if self.time + dt * (1 + 1e-9) >= until:
+            dt, landing = until - self.time, True
+        p = self.particles
+        with self.clock.phase("predict, correct"):
+            leapfrog.predict(dt, p.position, p.velocity, p.acceleration, self._velocity)
+            leapfrog.predict_scalar(dt, p.internal_energy, p.energy_rate, self._energy)
+            if p.alpha is not None:
+                leapfrog.predict_scalar(dt, p.alpha, p.alpha_rate, self._alpha)
+            stale = self.search.stale(p.position, p.support)
+        if stale:
+            self._build_lists(dt)
+        self._density(self.scene.models)
+        self._rates(self.scene.models)
+        with self.clock.phase("predict, correct"):
+            leapfrog.correct(dt, p.velocity, p.acceleration)
+            leapfrog.correct(dt, p.internal_energy, p.energy_rate)
+            if p.alpha is not None:
+                leapfrog.correct(dt, p.alpha, p.alpha_rate)
+        self.step += 1
+        self.time = until if landing else self.time + dt
+        self._measure()
+
+    def close(self) -> None:
+        self.team.close()
+
+    # --- the parts of a step ---
+
+    def _keep_predictions(self) -> None:
+        """At the start the predicted values are the values themselves."""
+        p = self.particles
+        self._velocity[:] = p.velocity
+        self._energy[:] = p.internal_energy
+        if p.alpha is not None:
+            self._alpha[:] = p.alpha
+
+    def _build_lists(self, dt: float, guess: bool = False) -> None:
+        """Order the particles anew and list their candidates."""
+        p = self.particles
+        with self.clock.phase("order"):
+            self.scene.domain.bring_inside(p.position, (p.velocity, self._velocity))
+            order = self.search.order(p.position, p.id)
+            for name, array in p.arrays().items():
+                # what this step computes anew need not be carried along
+                if name not in ("acceleration", "energy_rate", "alpha_rate", "density", "omega"):
+                    setattr(p, name, np.ascontiguousarray(array[..., order]))
+            self._velocity = np.ascontiguousarray(self._velocity[:, order])
+            self._energy = self._energy[order]
+            if p.alpha is not None:
+                self._alpha = self._alpha[order]
+        with self.clock.phase("lists"):
+            if guess:
+                models = self.scene.models
+                p.support = first_guess(
+                    p.position, self.scene.dimension, models.support_ratio * models.eta
+                )
+            skin = self.search.skin_for(self._velocity, p.support, dt)
+            self.search.build(Origin(p.position.copy(), p.support.copy(), skin), p.id)
+
+    def _neighbours(self) -> grad_h.Neighbours:
+        search = self.search
+        return grad_h.Neighbours(
+            search.lists, search.domain.images, search.origin.support, search.reach_factor
+        )
+
+    def _gas(self) -> grad_h.Gas:
+        p = self.particles
+        return grad_h.Gas(p.position, self._velocity, p.mass, self._energy, p.support)
+
+    def _fields(self, support) -> grad_h.Fields:
+        p = self.particles
+        return grad_h.Fields(support, p.density, p.omega, self._pressure_term, self._sound_speed)
+
+    def _density(self, models) -> None:
+        """Steps 2-4 and 6: density, support, Omega, div and curl, EOS, Balsara, alpha's rate."""
+        p = self.particles
+        for _ in range(MAX_WIDENINGS):
+            with self.clock.phase("density"):
+                self.team.run(
+                    grad_h.density, self._wanted.size, self._dim, models, self._neighbours(),
+                    self._gas(), self._alpha, self._fields(self._support), self._div_v,
+                    self._curl_v, self._balsara, p.alpha_rate, self._wanted,
+                )  # fmt: skip
+            if not self._wanted.max() > 0.0:
+                p.support, self._support = self._support, p.support
+                return
+            with self.clock.phase("lists"):
+                self.scene.domain.bring_inside(p.position, (p.velocity, self._velocity))
+                self.search.widen(p.position, self._wanted, p.id)
+        block = int(np.argmax(self._wanted))
+        raise NumericalError(
+            f"step {self.step}, t = {self.time:.6g}: no support holds enough neighbours for a "
+            f"particle among {p.id[block * BLOCK : (block + 1) * BLOCK].tolist()}.\n"
+            "Try: a closed domain (problem.boundary), or more particles."
+        )
+
+    def _rates(self, models) -> None:
+        """Step 5: acceleration, rate of energy, and each particle's signal speed."""
+        p = self.particles
+        with self.clock.phase("rates"):
+            self.team.run(
+                grad_h.rates, self._wanted.size, self._dim, models, self._neighbours(),
+                self._gas(), self._alpha, self._fields(p.support), self._balsara, p.acceleration,
+                p.energy_rate, self._signal_speed,
+            )  # fmt: skip
+
+    def _measure(self) -> None:
+        """Step 8, the sums of the history, and whether the state means anything."""
+        physics = self.scene.config.physics
+        with self.clock.phase("step size, sums"):
+            self.totals = self._sum()
+            self.limit = step_size.limit(
+                physics.C, physics.energy_limit, self.particles, self._signal_speed
+            )
+        self._check()
+
+    def _sum(self) -> Totals:
+        p = self.particles
+        return Totals(*_totals(p.mass, p.velocity, p.internal_energy, p.density))
+
+    def _check(self) -> None:
+        """Raise NumericalError where a number is not finite, or a density or energy not positive."""
+        t = self.totals
+        sound = np.isfinite(t.energy) and np.isfinite(t.max_density) and np.isfinite(self.limit.dt)
+        if sound and t.min_density > 0 and t.min_internal_energy >= 0 and self.limit.dt > 0:
+            return
+        p = self.particles
+        tests = (
+            ("density", p.density, ~(p.density > 0)),
+            ("internal energy", p.internal_energy, ~(p.internal_energy >= 0)),
+            ("velocity", p.velocity, ~np.isfinite(p.velocity)),
+            ("acceleration", p.acceleration, ~np.isfinite(p.acceleration)),
+            ("signal speed", self._signal_speed, ~np.isfinite(self._signal_speed)),
+        )
+        for name, values, bad in tests:
+            if bad.any():
+                i = int(np.argwhere(bad)[0][-1])
+                value = values[..., i]
+                where = ", ".join(f"{x:.6g}" for x in p.position[:, i])
+                raise NumericalError(
+                    f"step {self.step}, t = {self.time:.6g}: {name} of particle {p.id[i]} at "
+                    f"({where}) is {value}; {int(bad.any(axis=tuple(range(bad.ndim - 1))).sum())} "
+                    f"particle(s) are so.\nIts density {p.density[i]:.6g}, support "
+                    f"{p.support[i]:.6g}, internal energy {p.internal_energy[i]:.6g}.\n"
+                    "Try: a smaller physics.C, a larger physics.alpha, physics.energy_limit = true."
+                )
+        raise NumericalError(
+            f"step {self.step}, t = {self.time:.6g}: the time step came out as {self.limit.dt}."
+        )

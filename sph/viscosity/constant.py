@@ -1,0 +1,17 @@
+"""One viscosity coefficient for all particles and all times."""
+
+from typing import NamedTuple
+
+
+class Model(NamedTuple):
+    """`alpha`: the coefficient of eq 24."""
+
+    alpha: float
+
+    evolves = False
+
+    def start(self):
+        return self.alpha
+
+    def pair_alpha(self, alpha_i, alpha_j):
+        return self.alpha
