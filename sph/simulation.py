@@ -4,6 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 from numba import njit
+from numba.core.registry import cpu_target
 
 from sph.clock import Clock
 from sph.compiled import COMPILED
@@ -76,6 +77,8 @@ class Simulation:
         self.search = Search(scene.domain, self.team)
         self.time = 0.0
         self.step = 0
+        self.steps_here = 0  # of this session, which a restart begins anew
+        self.list_builds = 0
         self.limit = None
         self.totals = None
         n, blocks = particles.number, number_of_blocks(particles.number)
@@ -95,6 +98,9 @@ class Simulation:
     @classmethod
     def start(cls, scene: Scene, threads: int, clock: Clock) -> "Simulation":
         """From the problem's initial state: converged supports, rates, and the first step's size."""
+        with clock.phase("start of Numba"):
+            # its tables are filled on first use; here, so that no phase of a step pays for it
+            cpu_target.target_context.refresh()
         with clock.phase("initial state"):
             initial = scene.config.problem.initial(scene.eos)
             alpha = float(scene.viscosity.start()) if scene.evolves_alpha else None
@@ -147,6 +153,7 @@ class Simulation:
             if p.alpha is not None:
                 leapfrog.correct(dt, p.alpha, p.alpha_rate)
         self.step += 1
+        self.steps_here += 1
         self.time = until if landing else self.time + dt
         self._measure()
 
@@ -166,6 +173,7 @@ class Simulation:
     def _build_lists(self, dt: float, guess: bool = False) -> None:
         """Order the particles anew and list their candidates."""
         p = self.particles
+        self.list_builds += 1
         with self.clock.phase("order"):
             self.scene.domain.bring_inside(p.position, (p.velocity, self._velocity))
             order = self.search.order(p.position, p.id)

@@ -11,6 +11,7 @@ from numba import njit
 
 from sph.compiled import COMPILED
 from sph.neighbours.order import BLOCK, number_of_blocks
+from sph.threads import SMALLEST_RANGE
 
 CHUNK = 32  # blocks that share a stretch of the storage
 IMAGE_SHIFT = 26  # low bits of a candidate: the particle; above them the image (27 at most)
@@ -121,7 +122,7 @@ def build(tree, position, support, skin: float, images, team, room=None):
         region = np.concatenate([[0], np.cumsum(room + room // 7 + 64)])
         candidates = np.empty(region[-1], np.int32)
         team.run(_fill_chunks, chunks, tree, position, support, 1.0 + skin, images, region, start,
-                 count, candidates, needed)  # fmt: skip
+                 count, candidates, needed, smallest=SMALLEST_RANGE // CHUNK)  # fmt: skip
         if np.all(needed <= np.diff(region)):
             return Lists(start, count, candidates), needed
         room = needed.copy()

@@ -9,6 +9,7 @@ import numpy as np
 from numba import njit
 
 from sph.compiled import COMPILED
+from sph.threads import SMALLEST_RANGE
 
 BLOCK = 8  # particles a block: 4 or 16 were slower by 20-40 % in 3-D (density, rates and lists)
 
@@ -121,8 +122,9 @@ def block_order(position, identity, team):
     n = identity.size
     order = np.arange(n)
     key = np.empty(n)
-    # about four subtrees a thread even the load out; with a single thread there is nothing to share
-    levels = 0 if team.threads == 1 else (4 * team.threads - 1).bit_length()
+    # about four subtrees a thread even the load out; below that size there is nothing to share
+    shared = team.threads > 1 and number_of_blocks(n) > 4 * team.threads * SMALLEST_RANGE
+    levels = (4 * team.threads - 1).bit_length() if shared else 0
     _split(position, identity, order, key, 0, number_of_blocks(n), levels)
-    team.run(_split_subtrees, 1 << levels, position, identity, order, key, levels)
+    team.run(_split_subtrees, 1 << levels, position, identity, order, key, levels, smallest=1)
     return order

@@ -1,0 +1,134 @@
+"""The command line."""
+
+import sys
+from pathlib import Path
+
+import click
+
+from sph.errors import SphError
+from sph.version import __version__
+
+OVERRIDES = click.option(
+    "--set", "overrides", multiple=True, metavar="KEY=VALUE",
+    help="Set a key of the configuration, e.g. --set physics.alpha=2.0; may be repeated.",
+)  # fmt: skip
+THREADS = click.option(
+    "--threads", type=click.IntRange(min=1), metavar="N", help="Threads: run.threads for this run."
+)
+
+
+class Program(click.Group):
+    """Shows the program's own errors as their message and exits with their code."""
+
+    def invoke(self, context):
+        try:
+            return super().invoke(context)
+        except SphError as error:
+            click.echo(f"sph: {error}", err=True)
+            sys.exit(error.exit_code)
+
+
+@click.group(cls=Program, context_settings={"help_option_names": ["-h", "--help"]})
+@click.version_option(__version__, prog_name="sph")
+def main():
+    """Smoothed particle hydrodynamics: fast, checked, and honest about its error."""
+
+
+@main.command()
+@click.argument("config", type=click.Path(path_type=Path))
+@OVERRIDES
+@click.option("-o", "directory", type=click.Path(path_type=Path), metavar="DIR",
+              help="The run directory; runs/<name of CONFIG> if not given.")  # fmt: skip
+@THREADS
+@click.option("--dry-run", is_flag=True, help="Check CONFIG and say what the run would be.")
+@click.option("--force", is_flag=True, help="Replace an earlier run in DIR.")
+def run(config, overrides, directory, threads, dry_run, force):
+    """Run CONFIG, a TOML file, from its initial state to its end."""
+    from sph import config as configuration
+
+    resolved = configuration.load(config, _with_threads(overrides, threads))
+    if dry_run:
+        from sph import preview
+
+        click.echo(preview.describe(resolved))
+        return
+    from sph import progress, runner
+    from sph.analysis import summary
+    from sph.output.run_directory import RunDirectory
+
+    target = RunDirectory.create(directory or Path("runs") / config.stem, force)
+    result = runner.run(resolved, target, progress.suited())
+    click.echo(summary.in_words(result))
+    click.echo(f"Results: {target.path} (`sph plot {target.path}` draws them).")
+
+
+@main.command()
+@click.argument("source", metavar="RUN_OR_CHECKPOINT", type=click.Path(path_type=Path))
+@OVERRIDES
+@THREADS
+@click.option("-o", "directory", type=click.Path(path_type=Path), metavar="DIR",
+              help="Go on in a new run directory; in the same one if not given.")  # fmt: skip
+def restart(source, overrides, threads, directory):
+    """Go on from a run's last good checkpoint, or from that very checkpoint.
+
+    In the same directory later checkpoints are replaced.
+    """
+    from sph import progress, runner
+    from sph.analysis import summary
+
+    checkpoint, number, target = runner.prepare_restart(source, directory)
+    config = checkpoint.config.override(_with_threads(overrides, threads))
+    result = runner.restart(config, checkpoint, number, target, progress.suited())
+    click.echo(summary.in_words(result))
+    click.echo(f"Results: {target.path} (`sph plot {target.path}` draws them).")
+
+
+@main.command()
+@click.argument("sources", metavar="RUN_OR_CHECKPOINT...", nargs=-1, required=True,
+                type=click.Path(path_type=Path))  # fmt: skip
+@click.option("-o", "target", type=click.Path(path_type=Path), metavar="FILE",
+              help="The picture's file, for one picture; else they go to figures/ of the run.")  # fmt: skip
+def plot(sources, target):
+    """Draw runs or checkpoints: profiles, maps, slices and the history."""
+    from sph.analysis import figures
+
+    for path in figures.draw(sources, target):
+        click.echo(f"drew {path}")
+
+
+@main.command()
+@click.argument("problem")
+@click.option("-o", "target", type=click.Path(path_type=Path), metavar="FILE",
+              help="Write to FILE, which must not be there yet, instead of the terminal.")  # fmt: skip
+def new(problem, target):
+    """Print a configuration for PROBLEM with every key, its meaning, bounds and default."""
+    from sph import config as configuration
+
+    text = configuration.template(problem)
+    if target is None:
+        click.echo(text, nl=False)
+        return
+    from sph.output.files import write_new
+
+    write_new(target, text)
+    click.echo(f"wrote {target}")
+
+
+@main.command("list")
+def list_choices():
+    """Name the problems, kernels, schemes and the other choices there are."""
+    from sph import registry
+
+    for package in ("problems", "kernels", "schemes", "eos"):
+        click.echo(f"{package}:")
+        for name in registry.names(f"sph.{package}"):
+            module = registry.load(f"sph.{package}", name)
+            click.echo(f"  {name:24s} {module.__doc__.strip().splitlines()[0]}")
+
+
+def _with_threads(overrides, threads):
+    return [*overrides, *([f"run.threads={threads}"] if threads else [])]
+
+
+if __name__ == "__main__":
+    main()

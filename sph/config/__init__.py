@@ -1,0 +1,196 @@
+"""The configuration: every key once, with its type, bounds, default and help."""
+
+import dataclasses
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, Field, model_validator
+
+from sph.config import reading, registry
+from sph.config import template as templates
+from sph.config.choices import Choice, Gamma, ModelChoice
+from sph.config.errors import Issue, as_error, suggestion
+from sph.config.toml_text import key_text, value_text
+from sph.errors import ConfigError
+from sph.problems.base import Problem, Section
+
+AtLeastZero = Annotated[float, Field(ge=0)]
+Count = Annotated[int, Field(ge=1)]
+
+
+class AlphaRange(Section):
+    """A coefficient per particle that rises in compression and decays behind it."""
+
+    min: AtLeastZero = Field(description="where it decays to")
+    max: AtLeastZero = Field(description="where strong compression drives it")
+
+    @model_validator(mode="after")
+    def _in_order(self):
+        if self.min > self.max:
+            raise as_error([Issue(("min",), f"= {self.min}: expected at most max = {self.max}")])
+        return self
+
+
+class Physics(Section):
+    """The equations that are solved, in code units."""
+
+    scheme: Annotated[str, Choice("sph.schemes")] = Field(
+        "grad_h", description="how density and rates are summed over neighbours"
+    )
+    kernel: Annotated[Any, ModelChoice("sph.kernels")] = Field(
+        "wendland_c2", description="smoothing kernel"
+    )
+    gamma: Gamma | None = Field(
+        1.4, description="adiabatic index of an ideal gas, the ratio of specific heats"
+    )
+    eos: Annotated[Any, ModelChoice("sph.eos")] | None = Field(
+        None,
+        description="equation of state, in place of gamma",
+        examples=[{"name": "ideal_gas", "gamma": 1.4}],
+    )
+    alpha: AtLeastZero | AlphaRange = Field(
+        1.0,
+        description="artificial viscosity: one coefficient for all, or a range to switch it",
+    )
+    eta: float = Field(
+        1.6, gt=0, description="smoothing length in units of the local particle spacing"
+    )
+    C: float = Field(
+        0.15, gt=0, description="Courant number: the time step in units of the stable one"
+    )
+    balsara: bool = Field(
+        True, description="less viscosity where the flow shears; without effect in 1-D"
+    )
+    density_passes: Count | Literal["converged"] = Field(
+        2, description="passes of the density and smoothing length iteration in a step"
+    )
+    energy_limit: bool = Field(
+        True, description="limit the time step by u / |du/dt| so that heating is resolved"
+    )
+
+    @model_validator(mode="before")
+    @classmethod
+    def _gamma_gives_way(cls, data: Any) -> Any:
+        if isinstance(data, dict) and data.get("eos") is not None:
+            return {"gamma": None} | data
+        return data
+
+    def kernel_model(self):
+        """The smoothing kernel, a NamedTuple of `sph.kernels`."""
+        from sph import kernels
+
+        return kernels.make(**_named(self.kernel))
+
+    def eos_model(self):
+        """The equation of state, a NamedTuple of `sph.eos`."""
+        from sph import eos
+
+        return eos.make(**_named(self.eos or {"name": "ideal_gas", "gamma": self.gamma}))
+
+    def viscosity_model(self):
+        """The artificial viscosity, a NamedTuple of `sph.viscosity`."""
+        from sph.viscosity import constant, switched
+
+        if isinstance(self.alpha, AlphaRange):
+            return switched.Model(self.alpha.min, self.alpha.max)
+        return constant.Model(self.alpha)
+
+
+def _named(model: str | dict[str, Any]) -> dict[str, Any]:
+    return {"name": model} if isinstance(model, str) else model
+
+
+class Time(Section):
+    """How long the run goes on, in code units."""
+
+    end: float = Field(gt=0, description="time at which the run ends; it starts at 0")
+
+
+class Output(Section):
+    """What a run leaves behind."""
+
+    interval: float = Field(gt=0, description="time between checkpoints, in code units")
+
+
+class Run(Section):
+    """How the run is carried out; none of it changes a result."""
+
+    threads: Count | Literal["all"] = Field(
+        "all", description='processor threads; "all" uses every one there is'
+    )
+
+
+@dataclasses.dataclass(frozen=True)
+class Config:
+    """A complete and valid configuration: one attribute a table, every key resolved."""
+
+    problem: Problem
+    physics: Physics
+    time: Time
+    output: Output
+    run: Run
+
+    def to_toml(self, include_run: bool = True) -> str:
+        """All keys in their declared order; reading it back gives an equal configuration."""
+        tables = _tables(self)
+        if not include_run:
+            del tables["run"]
+        return "\n".join(_table_text(name, keys) for name, keys in tables.items())
+
+    def override(self, overrides: Sequence[str]) -> "Config":
+        """This configuration with `a.b=VALUE` set on top. Raises ConfigError."""
+        source = reading.Source("the configuration of the run", _tables(self), {})
+        return _resolve(source, overrides)
+
+
+SECTIONS: dict[str, type[Section]] = {
+    "physics": Physics,
+    "time": Time,
+    "output": Output,
+    "run": Run,
+}
+
+
+def load(path: str | Path, overrides: Sequence[str] = ()) -> Config:
+    """The configuration in a file, with `a.b=VALUE` set on top of it.
+
+    Raises FileError if the file cannot be read, ConfigError naming everything wrong in it.
+    """
+    return _resolve(reading.parse(reading.read(path), str(path)), overrides)
+
+
+def from_text(text: str, source: str = "checkpoint") -> Config:
+    """The configuration in a TOML text; `source` names it in errors. Raises ConfigError."""
+    return _resolve(reading.parse(text, source), ())
+
+
+def template(problem: str) -> str:
+    """A commented TOML for that problem: every key, its help, bounds and default.
+
+    Raises ConfigError, naming the nearest problem, if there is none of that name.
+    """
+    problems = registry.names("sph.problems")
+    if problem not in problems:
+        raise ConfigError(f'there is no problem "{problem}"; {suggestion(problem, problems)}')
+    default = from_text(f'[problem]\nname = "{problem}"\n')
+    return templates.text({name: getattr(default, name) for name in _names()})
+
+
+def _resolve(source: reading.Source, overrides: Sequence[str]) -> Config:
+    return Config(**reading.resolve(source, overrides, SECTIONS))
+
+
+def _names() -> list[str]:
+    return [field.name for field in dataclasses.fields(Config)]
+
+
+def _tables(config: Config) -> dict[str, dict[str, Any]]:
+    sections: dict[str, BaseModel] = {name: getattr(config, name) for name in _names()}
+    # A key that is not set (gamma beside eos) has no place in TOML.
+    return {name: section.model_dump(exclude_none=True) for name, section in sections.items()}
+
+
+def _table_text(name: str, keys: dict[str, Any]) -> str:
+    lines = (f"{key_text(key)} = {value_text(value)}\n" for key, value in keys.items())
+    return f"[{name}]\n" + "".join(lines)

@@ -1,0 +1,76 @@
+"""Keys whose value names a file of a folder: a scheme, a kernel, an equation of state."""
+
+from typing import Annotated, Any, get_type_hints
+
+from pydantic import Field, ValidationError, create_model
+from pydantic_core import core_schema
+
+from sph import registry
+from sph.config.errors import Issue, as_error, explain, wrong_value
+from sph.problems.base import Section
+
+Gamma = Annotated[float, Field(gt=1)]
+
+# Bounds of the models' parameters: their NamedTuples know types and defaults, not bounds.
+_PARAMETERS = {"gamma": Gamma}
+
+
+class Choice:
+    """Annotates a key whose value is the name of a file in `package`."""
+
+    def __init__(self, package: str):
+        self.package = package
+
+    def __get_pydantic_core_schema__(self, source, handler):
+        return core_schema.no_info_plain_validator_function(self.check)
+
+    def valid_names(self) -> list[str]:
+        return registry.names(self.package)
+
+    def describe(self) -> str:
+        return "one of " + ", ".join(f'"{name}"' for name in self.valid_names())
+
+    def check(self, value: Any) -> Any:
+        """The value in its resolved form. Raises the issues found, for pydantic to collect."""
+        if not isinstance(value, str) or value not in self.valid_names():
+            raise as_error([wrong_value((), value, Annotated[Any, self])])
+        return value
+
+
+class ModelChoice(Choice):
+    """The same where the file's `Model` may have parameters, given in a table beside its name.
+
+    Resolved, it is the name alone for a model without parameters, else a table with all of them.
+    """
+
+    def describe(self) -> str:
+        return super().describe() + ", or a table { name, its parameters }"
+
+    def parameters(self, name: str) -> type[Section]:
+        """The parameters of that model as a table of the configuration."""
+        model = registry.model_class(self.package, name)
+        fields = {
+            key: (_PARAMETERS.get(key, kind), model._field_defaults.get(key, ...))
+            for key, kind in get_type_hints(model).items()
+            if key in model._fields
+        }
+        return create_model(name, __base__=Section, **fields)
+
+    def check(self, value: Any) -> Any:
+        if not isinstance(value, dict):
+            value = {"name": super().check(value)}
+        if "name" not in value:
+            raise as_error([Issue(("name",), f"is missing: expected {super().describe()}")])
+        name = value["name"]
+        if not isinstance(name, str) or name not in self.valid_names():
+            raise as_error([wrong_value(("name",), name, Annotated[Any, Choice(self.package)])])
+        given = {key: entry for key, entry in value.items() if key != "name"}
+        found = self._validated(self.parameters(name), given).model_dump()
+        return {"name": name, **found} if found else name
+
+    def _validated(self, table: type[Section], given: dict[str, Any]) -> Section:
+        try:
+            return table.model_validate(given)
+        except ValidationError as error:
+            issues = explain(table, given, error.errors(include_url=False), table.__name__, {})
+            raise as_error([one._replace(path=one.path[1:]) for one in issues]) from None

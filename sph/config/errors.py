@@ -1,0 +1,284 @@
+"""What is wrong with a configuration, in plain words: where, what was found, what was expected."""
+
+import difflib
+import math
+import types
+import typing
+from collections import defaultdict
+from collections.abc import Iterable, Iterator
+from typing import Annotated, Any, Literal, NamedTuple
+
+from pydantic import BaseModel
+from pydantic.fields import FieldInfo
+from pydantic_core import ErrorDetails, PydanticCustomError
+
+from sph.config.toml_text import Path, value_text
+
+
+class Issue(NamedTuple):
+    """One thing wrong: the key it concerns, and a text that continues the key's name."""
+
+    path: Path
+    text: str
+
+
+def dotted(path: Path) -> str:
+    """A path as the user writes it: ("problem", "domain", 1) is "problem.domain[1]"."""
+    text = "".join(f"[{step}]" if isinstance(step, int) else f".{step}" for step in path)
+    return text.removeprefix(".")
+
+
+def nearest(name: str, valid: Iterable[str]) -> str | None:
+    """The valid name most like `name`, if any is alike."""
+    by_lower = {one.lower(): one for one in valid}
+    close = difflib.get_close_matches(name.lower(), by_lower, n=1, cutoff=0.5)
+    return by_lower[close[0]] if close else None
+
+
+def suggestion(name: str, valid: Iterable[str]) -> str:
+    """A sentence's end that leads from a wrong name to a valid one."""
+    valid = list(valid)
+    close = nearest(name, valid)
+    return f"did you mean {close}?" if close else f"there are {', '.join(valid) or 'none'}"
+
+
+def wrong_value(path: Path, value: Any, annotation: Any) -> Issue:
+    """`value` does not fit the annotation of its key."""
+    hint = ""
+    if isinstance(value, str) and (close := nearest(value, valid_names(annotation))):
+        hint = f'; did you mean "{close}"?'
+    return Issue(path, f"= {_found(value)}: expected {describe(annotation)}{hint}")
+
+
+def not_finite(value: Any, path: Path = ()) -> Iterator[Issue]:
+    """One issue for every infinite or undefined number in a tree of tables and lists."""
+    if isinstance(value, float) and not math.isfinite(value):
+        yield Issue(path, f"= {_found(value)}: expected a finite number")
+    elif isinstance(value, dict | list):
+        for key, entry in value.items() if isinstance(value, dict) else enumerate(value):
+            yield from not_finite(entry, (*path, key))
+
+
+def as_error(issues: Iterable[Issue]) -> PydanticCustomError:
+    """To raise in a validator: issues with paths relative to the value it validates."""
+    return PydanticCustomError("issues", "{issues}", {"issues": list(issues)})
+
+
+def _found(value: Any) -> str:
+    text = value_text(value)
+    return text if len(text) <= 60 else text[:57] + "..."
+
+
+# --- types in words ---------------------------------------------------------------------------
+
+_NOUNS = {float: "number", int: "whole number", str: "string"}
+_BOUNDS = {"gt": "greater than", "ge": "of at least", "lt": "less than", "le": "of at most"}
+
+
+def field_annotation(field: FieldInfo) -> Any:
+    """The type of a field with its bounds."""
+    return Annotated[(field.annotation, *field.metadata)] if field.metadata else field.annotation
+
+
+def _plain(annotation: Any) -> tuple[Any, list[Any]]:
+    """The bare type and everything said about it."""
+    if typing.get_origin(annotation) is not Annotated:
+        return annotation, []
+    bare, *said = typing.get_args(annotation)
+    flat = [
+        each for one in said for each in (one.metadata if isinstance(one, FieldInfo) else [one])
+    ]
+    return bare, flat
+
+
+def branches(annotation: Any) -> list[Any]:
+    """The alternatives of a union other than None; of anything else itself."""
+    bare, said = _plain(annotation)
+    if _choice(said) or typing.get_origin(bare) not in (types.UnionType, typing.Union):
+        return [annotation]
+    some = [one for one in typing.get_args(bare) if one is not type(None)]
+    return [Annotated[(one, *said)] if said else one for one in some]
+
+
+def _choice(said: list[Any]) -> Any:
+    return next((one for one in said if hasattr(one, "valid_names")), None)
+
+
+def _is_table(bare: Any) -> bool:
+    return isinstance(bare, type) and issubclass(bare, BaseModel)
+
+
+def _bounds(said: list[Any]) -> str:
+    found = {name: getattr(one, name) for one in said for name in _BOUNDS if hasattr(one, name)}
+    if {"ge", "le"} <= found.keys():
+        return f" from {found['ge']} to {found['le']}"
+    parts = [f"{words} {found[name]}" for name, words in _BOUNDS.items() if name in found]
+    return " " + " and ".join(parts) if parts else ""
+
+
+def _length(said: list[Any]) -> str:
+    low = next((one.min_length for one in said if hasattr(one, "min_length")), None)
+    high = next((one.max_length for one in said if hasattr(one, "max_length")), None)
+    if high is not None:
+        return f"{high} " if low == high else f"{low or 0} to {high} "
+    return f"at least {low} " if low else ""
+
+
+def describe(annotation: Any, plural: bool = False) -> str:
+    """A type with its bounds in words, e.g. "a number greater than 1"."""
+    alternatives = branches(annotation)
+    if len(alternatives) > 1:
+        return _any_of(alternatives, plural)
+    bare, said = _plain(alternatives[0])
+    if choice := _choice(said):
+        return choice.describe()
+    if typing.get_origin(bare) is Literal:
+        *most, last = [value_text(one) for one in typing.get_args(bare)]
+        return f"{', '.join(most)} or {last}" if most else last
+    if typing.get_origin(bare) is list:
+        entries = describe(typing.get_args(bare)[0], plural=True)
+        return f"{'lists' if plural else 'a list'} of {_length(said)}{entries}"
+    if _is_table(bare):
+        return "a table { " + ", ".join(bare.model_fields) + " }"
+    if bare is bool:
+        return "true or false"
+    noun = _NOUNS.get(bare, "value")
+    return (f"{noun}s" if plural else f"a {noun}") + _bounds(said)
+
+
+def _any_of(alternatives: list[Any], plural: bool) -> str:
+    parts = []
+    for one in alternatives:
+        entries = typing.get_args(one) if typing.get_origin(one) is list else ()
+        these = bool(entries) and entries[0] in alternatives
+        parts.append("a list of these" if these else describe(one, plural))
+    return (", or " if any('"' in part for part in parts[:-1]) else " or ").join(parts)
+
+
+def valid_names(annotation: Any) -> list[str]:
+    """Every fixed name a value of this type may be."""
+    found: list[str] = []
+    for branch in branches(annotation):
+        bare, said = _plain(branch)
+        if choice := _choice(said):
+            found += choice.valid_names()
+        elif typing.get_origin(bare) is Literal:
+            found += [one for one in typing.get_args(bare) if isinstance(one, str)]
+        elif typing.get_origin(bare) is list:
+            found += valid_names(typing.get_args(bare)[0])
+    return found
+
+
+def inner(annotation: Any, path: Path) -> Any:
+    """The type of the entry at `path` within a value of this type."""
+    for step in path:
+        found = []
+        for branch in branches(annotation):
+            bare, _ = _plain(branch)
+            if isinstance(step, int) and typing.get_origin(bare) is list:
+                found.append(typing.get_args(bare)[0])
+            elif _is_table(bare) and step in bare.model_fields:
+                found.append(field_annotation(bare.model_fields[step]))
+        if not found:
+            return Any
+        annotation = typing.Union[tuple(found)]  # noqa: UP007 (a tuple of types)
+    return annotation
+
+
+# --- from pydantic's errors -------------------------------------------------------------------
+
+
+class _Located(NamedTuple):
+    path: Path  # steps into the value
+    union: Path | None  # where the first union on the way stands
+    branch: str | int | None  # which of its alternatives was tried
+    error: ErrorDetails
+
+
+def _locate(error: ErrorDetails, raw: Any) -> _Located:
+    """Tell the steps into the value from pydantic's names of a union's branches."""
+    steps = error["loc"]
+    path, union, branch, value = [], None, None, raw
+    for i, step in enumerate(steps):
+        absent = i == 0 or (i == len(steps) - 1 and error["type"] == "missing")
+        inside = (isinstance(value, dict) and step in value) or (
+            isinstance(value, list) and isinstance(step, int)
+        )
+        if inside or absent:
+            path.append(step)
+            value = value[step] if inside else None
+        elif union is None:
+            union, branch = tuple(path), step
+    return _Located(tuple(path), union, branch, error)
+
+
+_SAID_IN_WORDS = ("value_error", "assertion_error", "issues")
+
+
+def _of_one_branch(found: list[_Located]) -> list[_Located]:
+    """A union reports every branch: keep the one the user meant, or one report on the whole."""
+    tried = defaultdict(list)
+    for one in found:
+        tried[one.branch].append(one)
+    meant = [
+        errors
+        for errors in tried.values()
+        if all(one.path != one.union or one.error["type"] in _SAID_IN_WORDS for one in errors)
+    ]
+    if not meant:
+        return [next(one for one in found if one.path == one.union)]
+    return min(meant, key=lambda errors: (len(errors), -max(len(one.path) for one in errors)))
+
+
+def explain(
+    model: type[BaseModel],
+    raw: dict[str, Any],
+    errors: list[ErrorDetails],
+    table: str,
+    elsewhere: dict[str, str],
+) -> list[Issue]:
+    """Pydantic's errors on `raw`, the table named `table`, one issue for each thing wrong.
+
+    `elsewhere` names the table of each key of the other tables.
+    """
+    located = [_locate(error, raw) for error in errors]
+    unions = defaultdict(list)
+    for one in located:
+        if one.union is not None:
+            unions[one.union].append(one)
+    kept = [one for one in located if one.union is None]
+    kept += [one for found in unions.values() for one in _of_one_branch(found)]
+    return [issue for one in kept for issue in _issues(one, model, (table,), elsewhere)]
+
+
+def _issues(
+    located: _Located, model: type[BaseModel], prefix: Path, elsewhere: dict[str, str]
+) -> list[Issue]:
+    path, error = prefix + located.path, located.error
+    match error["type"]:
+        case "issues":
+            return [Issue(path + one.path, one.text) for one in error["ctx"]["issues"]]
+        case "value_error" | "assertion_error":
+            return [Issue(path, f": {error['ctx']['error']}")]
+        case "missing":
+            annotation = inner(model, located.path)
+            return [Issue(path, f"is missing: expected {describe(annotation)}")]
+        case "extra_forbidden":
+            holder = inner(model, located.path[:-1])
+            return [_unknown_key(path, holder, elsewhere if len(path) == 2 else {})]
+    return [wrong_value(path, error["input"], inner(model, located.path))]
+
+
+def _unknown_key(path: Path, holder: Any, elsewhere: dict[str, str]) -> Issue:
+    valid = [
+        key for one in branches(holder) if _is_table(_plain(one)[0]) for key in one.model_fields
+    ]
+    return unknown_key(path, valid, elsewhere)
+
+
+def unknown_key(path: Path, valid: Iterable[str], elsewhere: dict[str, str]) -> Issue:
+    """The last step of `path` is no key of its table, whose valid keys are given."""
+    key, table = str(path[-1]), dotted(path[:-1])
+    if key in elsewhere:
+        return Issue(path, f"is not a key of [{table}]: {key} belongs in [{elsewhere[key]}]")
+    return Issue(path, f"is not a key of [{table}]; {suggestion(key, valid)}")

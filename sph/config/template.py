@@ -1,0 +1,72 @@
+"""A commented configuration to start from."""
+
+import textwrap
+from typing import Any
+
+from pydantic import BaseModel
+from pydantic.fields import FieldInfo
+
+from sph.config.errors import branches, describe, field_annotation
+from sph.config.toml_text import value_text
+
+
+def text(sections: dict[str, BaseModel]) -> str:
+    """TOML with every key of these tables at its value, above it its help, bounds and default."""
+    return "\n".join(_table(name, section) for name, section in sections.items())
+
+
+def _table(name: str, section: BaseModel) -> str:
+    model = type(section)
+    keys = (
+        _key(key, field, _help(model, key), getattr(section, key))
+        for key, field in model.model_fields.items()
+    )
+    summary = _comment((model.__doc__ or "").partition("\n\n")[0])
+    return f"{summary}[{name}]\n\n" + "\n".join(keys)
+
+
+def _help(model: type[BaseModel], key: str) -> str:
+    """What the key is, from the class or the nearest base class that says so."""
+    fields = (base.model_fields.get(key) for base in model.__mro__ if issubclass(base, BaseModel))
+    return next((field.description for field in fields if field and field.description), key)
+
+
+def _key(key: str, field: FieldInfo, sentence: str, value: Any) -> str:
+    annotation = field_annotation(field)
+    shown = value.model_dump(exclude_none=True) if isinstance(value, BaseModel) else value
+    default = "" if shown is None else f"default {value_text(shown)}"
+    kind = describe(annotation)
+    fits = default and len(kind) + len(default) < 90
+    lines = [f"{kind}; {default}"] if fits else [kind, default]
+    above = _comment(sentence) + "".join(_comment(f"  {line}") for line in lines)
+    entries = "".join(_entries(branch) for branch in branches(annotation))
+    return above + entries + _line(key, field, shown)
+
+
+def _entries(branch: Any) -> str:
+    """A line for each entry, where the value may be a table."""
+    if not (isinstance(branch, type) and issubclass(branch, BaseModel)):
+        return ""
+    lines = (
+        f"  {key}: {field.description or key}, {describe(field_annotation(field))}"
+        for key, field in branch.model_fields.items()
+    )
+    return "".join(_comment(line) for line in lines)
+
+
+def _line(key: str, field: FieldInfo, value: Any) -> str:
+    if value is not None:
+        return f"{key} = {value_text(value)}\n"
+    example = f" {value_text(field.examples[0])}" if field.examples else ""
+    return f"# {key} ={example}\n"
+
+
+def _comment(sentence: str) -> str:
+    if not sentence.strip():
+        return ""
+    indent = " " * (len(sentence) - len(sentence.lstrip()))
+    words = " ".join(sentence.split())
+    lines = textwrap.wrap(
+        words, 98, initial_indent=indent, subsequent_indent=indent + "  ", break_long_words=False
+    )
+    return "".join(f"# {line}\n" for line in lines)

@@ -1,0 +1,140 @@
+"""TOML as text: in which line each key stands (the standard reader does not say), and values."""
+
+import re
+import tomllib
+from typing import Any, NamedTuple
+
+import tomli_w
+
+Path = tuple[str | int, ...]
+
+# The longest form of a string first; a closing triple quote may follow up to two quotes of content.
+_TOKEN = re.compile(
+    r'''
+    (?P<blank> [ \t\r]+ | \#[^\n]* )
+  | (?P<string> """(?:\\.|[^\\])*?"""(?!") | \'\'\'.*?\'\'\'(?!\')
+              | "(?:\\.|[^"\\\n])*" | '[^'\n]*' )
+  | (?P<mark> [\n\[\]{}=,.] )
+  | (?P<word> [^\s\[\]{}=,."'\#]+ )
+    ''',
+    re.VERBOSE | re.DOTALL,
+)
+
+
+class _Token(NamedTuple):
+    kind: str
+    text: str
+    line: int
+
+
+def _tokens(text: str) -> list[_Token]:
+    found, line = [], 1
+    for match in _TOKEN.finditer(text):
+        if match.lastgroup != "blank":
+            found.append(_Token(match.lastgroup, match.group(), line))
+        line += match.group().count("\n")
+    found.append(_Token("mark", "\n", line))
+    return found
+
+
+class _Reader:
+    """Walks over a text that is known to be valid TOML."""
+
+    def __init__(self, text: str):
+        self.tokens = _tokens(text)
+        self.at = 0
+        self.lines: dict[Path, int] = {}
+
+    @property
+    def next(self) -> str:
+        return self.tokens[self.at].text
+
+    def take(self) -> _Token:
+        self.at += 1
+        return self.tokens[self.at - 1]
+
+    def key(self) -> tuple[Path, int]:
+        """A dotted key up to its `=` or `]`, and its line."""
+        parts, line = [], self.tokens[self.at].line
+        while self.next not in "=]":
+            token = self.take()
+            if token.kind == "string":
+                parts.append(tomllib.loads(f"key = {token.text}")["key"])
+            elif token.kind == "word":
+                parts.append(token.text)
+        return tuple(parts), line
+
+    def note(self, path: Path, start: int, line: int) -> None:
+        for end in range(start + 1, len(path) + 1):
+            self.lines.setdefault(path[:end], line)
+
+    def statements(self) -> None:
+        table: Path = ()
+        while self.at < len(self.tokens):
+            if self.next == "\n":
+                self.take()
+            elif self.next == "[":
+                table = self.header()
+            else:
+                self.pair(table)
+
+    def header(self) -> Path:
+        while self.next == "[":
+            self.take()
+        path, line = self.key()
+        while self.next == "]":
+            self.take()
+        self.note(path, 0, line)
+        return path
+
+    def pair(self, table: Path | None) -> None:
+        key, line = self.key()
+        self.take()  # =
+        path = None if table is None else table + key
+        if path is not None:
+            self.note(path, len(table), line)
+        self.value(path)
+
+    def value(self, path: Path | None) -> None:
+        """Skip a value, noting the keys of an inline table unless `path` is None (in an array)."""
+        if self.next == "{":
+            self.entries("}", lambda: self.pair(path))
+        elif self.next == "[":
+            self.entries("]", lambda: self.value(None))
+        else:
+            while self.next not in ("\n", ",", "]", "}"):
+                self.take()
+
+    def entries(self, close: str, read) -> None:
+        self.take()
+        while self.next != close:
+            if self.next in ("\n", ","):
+                self.take()
+            else:
+                read()
+        self.take()
+
+
+def key_lines(text: str) -> dict[Path, int]:
+    """The line (from 1) where each table and key of a valid TOML text begins, by its path.
+
+    Entries of an array have no line of their own: theirs is the line of the array's key.
+    """
+    reader = _Reader(text)
+    reader.statements()
+    return reader.lines
+
+
+def value_text(value: Any) -> str:
+    """A value as TOML on one line; tables inline."""
+    if isinstance(value, dict):
+        pairs = (f"{key_text(key)} = {value_text(entry)}" for key, entry in value.items())
+        return "{ " + ", ".join(pairs) + " }" if value else "{}"
+    if isinstance(value, list):
+        return "[" + ", ".join(value_text(entry) for entry in value) + "]"
+    return tomli_w.dumps({"k": value}).removeprefix("k = ").rstrip("\n")
+
+
+def key_text(key: str) -> str:
+    """A key as TOML, quoted where it must be."""
+    return tomli_w.dumps({key: 0}).removesuffix(" = 0\n")

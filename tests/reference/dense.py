@@ -1,0 +1,477 @@
+"""The grad-h scheme written out densely in double precision: what the engine is measured against.
+
+Every particle meets every particle and every image of it; nothing here knows of trees, blocks or
+lists, and nothing is imported from the program. Equation numbers are those of the paper's grad-h
+section; where it misprints, the correction stands beside the formula. Code units throughout;
+vectors are (D, N), scalars (N,).
+"""
+
+import itertools
+from dataclasses import dataclass, field, replace
+from typing import NamedTuple
+
+import numpy as np
+
+ELEMENTS_PER_BLOCK = 1_000_000  # of the distance matrix held at once: 8 MB an array
+
+
+def wendland_c2(q, dimension):
+    """(w, dw/dq) of eqs 11-14 at q = r/H, an array; zero from q = 1 on."""
+    p = np.maximum(1.0 - q, 0.0)
+    if dimension == 1:
+        return 5 / 4 * p**3 * (1 + 3 * q), 15 / 4 * (p**3 - p**2 * (1 + 3 * q))
+    c_w = 7 / np.pi if dimension == 2 else 21 / (2 * np.pi)
+    return c_w * p**4 * (1 + 4 * q), 4 * c_w * (p**4 - p**3 * (1 + 4 * q))
+
+
+def cubic_spline(q, dimension):
+    """(w, dw/dq) of the draft's appendix at q = r/H, an array; zero from q = 1 on."""
+    p = np.maximum(1.0 - q, 0.0)
+    norm = 2**dimension * (2 / 3, 10 / (7 * np.pi), 1 / np.pi)[dimension - 1]
+    value = np.where(q < 0.5, 1 - 6 * q**2 + 6 * q**3, 2 * p**3)
+    return norm * value, -6 * norm * np.where(q < 0.5, 2 * q - 3 * q**2, p**2)
+
+
+KERNELS = {"wendland_c2": wendland_c2, "cubic_spline": cubic_spline}
+# H/h = 1/(2 sigma), sigma the standard deviation per axis at H = 1 (Dehnen & Aly 2012);
+# the paper prints 1.93492 for the 3-D Wendland kernel, which is sqrt(15)/2 = 1.936492.
+H_PER_h = {
+    "wendland_c2": np.sqrt([21 / 2, 72 / 5, 15]) / 2,
+    "cubic_spline": np.sqrt([12, 392 / 31, 40 / 3]) / 2,
+}
+
+
+@dataclass(frozen=True)
+class Scene:
+    """Parameters of the scheme; `box` (D, 2), one of `boundaries` per axis."""
+
+    box: np.ndarray
+    boundaries: tuple[str, ...]  # "periodic", "mirror" or "open"
+    gamma: float = 1.4
+    eta: float = 1.6
+    C: float = 0.15
+    alpha: float | dict[str, float] = 1.0  # or {"min": …, "max": …}
+    kernel: str = "wendland_c2"
+    flattened: bool = False  # the cubic spline's flattened gradient, in eqs 22-23 only
+    balsara: bool = True
+    density_passes: int | str = 2  # or "converged"
+    energy_limit: bool = True
+
+    @property
+    def dimension(self):
+        return len(self.box)
+
+    @property
+    def h_ratio(self):
+        """H/h of eq 15."""
+        return H_PER_h[self.kernel][self.dimension - 1]
+
+    def kernel_at(self, r, support):
+        """(W, dW/dr, dW/dH) of eqs 9, 18 and 10."""
+        q, d = r / support, self.dimension
+        w, slope = KERNELS[self.kernel](q, d)
+        by_support = -(d * w + q * slope) * support ** -(d + 1.0)
+        return w * support**-d, slope * support ** -(d + 1.0), by_support
+
+    def force_slope(self, r, support):
+        """dW/dr as eqs 22-23 take it: flat within q = 1/3 where the scene says so."""
+        slope = self.kernel_at(r, support)[1]
+        if not self.flattened:
+            return slope
+        if self.kernel != "cubic_spline":
+            raise ValueError("only the cubic spline has a flattened gradient")
+        flat = self.kernel_at(support / 3, support)[1]
+        return np.where(r < support / 3, flat, slope)
+
+
+class Pairs(NamedTuple):
+    """P pairs (i, j), j a particle or an image of it, i itself included."""
+
+    i: np.ndarray  # (P,)
+    j: np.ndarray  # (P,) the particle whose image it is
+    sign: np.ndarray  # (D, P) by which the image's velocity is multiplied
+    r: np.ndarray  # (P,)
+    unit: np.ndarray  # (D, P) r_ij / |r_ij|, zero where r = 0
+
+    def sum(self, term, count):
+        """Sum over j of (P,) or (D, P) terms for each of `count` particles i."""
+        if term.ndim == 1:
+            return np.bincount(self.i, term, count)
+        return np.array([np.bincount(self.i, component, count) for component in term])
+
+    def difference(self, velocity):
+        """(D, P): v_i - v_j with the image's sign."""
+        return velocity[:, self.i] - self.sign * velocity[:, self.j]
+
+
+@dataclass
+class Rates:
+    """Steps 2-6 for all particles; `x_scale` is what round-off in x is measured by.
+
+    Where x is a sum its scale is the sum of the absolute values of its pair terms (for vectors, of
+    their moduli), with the factor before the sum; where it follows from such sums, their scales
+    put through the formula; else its own modulus.
+    """
+
+    support: np.ndarray
+    density: np.ndarray
+    omega: np.ndarray
+    divergence: np.ndarray
+    curl: np.ndarray  # its modulus
+    pressure: np.ndarray
+    sound_speed: np.ndarray
+    balsara: np.ndarray
+    acceleration: np.ndarray
+    energy_rate: np.ndarray
+    alpha_rate: np.ndarray
+    signal_speed: np.ndarray  # largest of the particle's pairs
+    support_scale: np.ndarray
+    density_scale: np.ndarray
+    omega_scale: np.ndarray
+    divergence_scale: np.ndarray
+    curl_scale: np.ndarray
+    pressure_scale: np.ndarray
+    sound_speed_scale: np.ndarray
+    balsara_scale: np.ndarray
+    acceleration_scale: np.ndarray  # (N,)
+    energy_rate_scale: np.ndarray
+    alpha_rate_scale: np.ndarray
+    signal_speed_scale: np.ndarray
+
+
+def _axis_images(low, high, boundary):
+    """(sign, offset) of the images along one axis: x' = sign x + offset."""
+    if boundary == "open":
+        return [(1.0, 0.0)]
+    if boundary == "periodic":
+        return [(1.0, 0.0), (1.0, low - high), (1.0, high - low)]
+    if boundary == "mirror":
+        return [(1.0, 0.0), (-1.0, 2 * low), (-1.0, 2 * high)]
+    raise ValueError(f"unknown boundary {boundary!r}")
+
+
+def _images(scene):
+    """(sign, offset), each (D, 1), of every combination of the axes' images."""
+    axes = [
+        _axis_images(low, high, boundary)
+        for (low, high), boundary in zip(scene.box, scene.boundaries, strict=True)
+    ]
+    for combination in itertools.product(*axes):
+        sign, offset = np.array(combination).T
+        yield sign[:, None], offset[:, None]
+
+
+def _pairs(scene, position, reach_i, reach_j):
+    """All pairs with r_ij < max(reach_i, reach_j), both (N,), found by trying every one."""
+    d, n = position.shape
+    rows = max(1, ELEMENTS_PER_BLOCK // n)
+    found = []
+    for sign, offset in _images(scene):
+        image = sign * position + offset
+        for first in range(0, n, rows):
+            block = slice(first, first + rows)
+            r_ij = position[:, block, None] - image[:, None, :]
+            r = np.abs(r_ij[0]) if d == 1 else np.sqrt((r_ij**2).sum(axis=0))
+            i, j = np.nonzero(r < np.maximum(reach_i[block, None], reach_j))
+            unit = r_ij[:, i, j] / np.where(r[i, j] > 0, r[i, j], 1.0)
+            found.append((i + first, j, np.broadcast_to(sign, unit.shape), r[i, j], unit))
+    return Pairs(*(np.concatenate(parts, axis=-1) for parts in zip(*found, strict=True)))
+
+
+def _density(scene, position, mass, support):
+    """(rho, Omega, scale of Omega) of eqs 7 and 8 at the given H."""
+    for (low, high), boundary in zip(scene.box, scene.boundaries, strict=True):
+        if boundary != "open" and support.max() > high - low:
+            raise ValueError("H exceeds the box: one image to each side does not suffice")
+    n = len(mass)
+    pairs = _pairs(scene, position, support, np.zeros(n))
+    w, _, by_support = scene.kernel_at(pairs.r, support[pairs.i])
+    m_j = mass[pairs.j]
+    rho = pairs.sum(m_j * w, n)
+    factor = support / (scene.dimension * rho)
+    omega = 1 + factor * pairs.sum(m_j * by_support, n)
+    return rho, omega, 1 + factor * pairs.sum(m_j * abs(by_support), n)
+
+
+def _kernel_mass(scene, position, mass, support):
+    """Sum_j m_j w(r_ij/H_i) = H^D rho: it grows with H, and eq 15 asks it to be (H/h eta)^D m."""
+    pairs = _pairs(scene, position, support, np.zeros(len(mass)))
+    w = scene.kernel_at(pairs.r, support[pairs.i])[0]
+    return pairs.sum(mass[pairs.j] * w, len(mass)) * support**scene.dimension
+
+
+def _bracket(scene, position, mass, guess, target):
+    """(low, high) around the H at which the kernel mass reaches its target."""
+    high = np.array(guess, dtype=float)
+    low = high.copy()
+    for _ in range(100):
+        short = _kernel_mass(scene, position, mass, high) < target
+        over = _kernel_mass(scene, position, mass, low) >= target
+        if not (short.any() or over.any()):
+            return low, high
+        high[short] *= 2
+        low[over] /= 2
+    raise ValueError(f"eq 15 has no solution for particles {np.flatnonzero(short | over)}")
+
+
+def _converged_support(scene, position, mass, guess):
+    """H solving eqs 7 and 15 together, by bisection until no number lies between the ends."""
+    target = (scene.h_ratio * scene.eta) ** scene.dimension * mass
+    low, high = _bracket(scene, position, mass, guess, target)
+    n = len(mass)
+    pairs = _pairs(scene, position, high, np.zeros(n))
+    m_j = mass[pairs.j]
+    for _ in range(1100):  # more than the bits of any interval of doubles
+        middle = 0.5 * (low + high)
+        if np.all((middle == low) | (middle == high)):
+            break
+        w, _ = KERNELS[scene.kernel](pairs.r / middle[pairs.i], scene.dimension)
+        over = pairs.sum(m_j * w, n) >= target
+        low, high = np.where(over, low, middle), np.where(over, middle, high)
+    return high
+
+
+def _smoothing(scene, position, mass, guess):
+    """Steps 2a-2c. After counted passes H is newer by eq 15 than the rho and Omega beside it."""
+    if scene.density_passes == "converged":
+        support = _converged_support(scene, position, mass, guess)
+        rho, omega, omega_scale = _density(scene, position, mass, support)
+    else:
+        support = guess
+        for _ in range(scene.density_passes):
+            rho, omega, omega_scale = _density(scene, position, mass, support)
+            support = scene.h_ratio * scene.eta * (mass / rho) ** (1 / scene.dimension)  # eq 15
+    return {
+        "support": support,
+        "density": rho,
+        "omega": omega,
+        "support_scale": support,
+        "density_scale": rho,  # all its terms are positive
+        "omega_scale": omega_scale,
+    }
+
+
+def _cross(a, b):
+    """(1 or 3, P) cross product of (D, P) vectors: in 2-D the z component, in 1-D zero."""
+    if len(a) == 1:
+        return np.zeros_like(a)
+    if len(a) == 2:
+        return (a[0] * b[1] - a[1] * b[0])[None]
+    return np.cross(a, b, axis=0)
+
+
+def _flow(scene, pairs, mass, velocity, state):
+    """Divergence and curl, eqs 16 and 17."""
+    n = len(mass)
+    m_dW = mass[pairs.j] * scene.kernel_at(pairs.r, state["support"][pairs.i])[1]
+    v_ij = pairs.difference(velocity)
+    per_volume = 1 / (state["omega"] * state["density"])
+    # eq 16 is printed without this minus: with v_ij = v_i - v_j an expansion would be negative
+    approach = -m_dW * (v_ij * pairs.unit).sum(axis=0)
+    turn = m_dW * _cross(v_ij, pairs.unit)
+    return {
+        "divergence": per_volume * pairs.sum(approach, n),
+        "curl": np.linalg.norm(per_volume * pairs.sum(turn, n), axis=0),
+        "divergence_scale": abs(per_volume) * pairs.sum(abs(approach), n),
+        "curl_scale": abs(per_volume) * pairs.sum(np.linalg.norm(turn, axis=0), n),
+    }
+
+
+def _thermodynamics(scene, internal_energy, state):
+    """Pressure, sound speed and Balsara's factor, eqs 19-21."""
+    pressure = (scene.gamma - 1) * state["density"] * internal_energy
+    sound = np.sqrt(scene.gamma * pressure / state["density"])
+    compression = abs(state["divergence"])
+    denominator = compression + state["curl"] + 1e-4 * sound / state["support"]
+    factor = np.ones_like(sound)
+    if scene.balsara:  # 0/0, cold gas without any shear, counts as no compression
+        factor = compression / np.where(denominator > 0, denominator, 1.0)
+    return {
+        "pressure": pressure,
+        "sound_speed": sound,
+        "balsara": factor,
+        "pressure_scale": pressure,
+        "sound_speed_scale": sound,
+        "balsara_scale": np.ones_like(factor),
+    }
+
+
+def _forces(scene, pairs, mass, velocity, alpha, state):
+    """Acceleration, energy rate and largest signal speed, eqs 22-26."""
+    n, i, j = len(mass), pairs.i, pairs.j
+    rho, sound, f, support = (
+        state[name] for name in ("density", "sound_speed", "balsara", "support")
+    )
+    radial = (pairs.difference(velocity) * pairs.unit).sum(axis=0)
+    w_ij = np.minimum(radial, 0.0)  # eq 26
+    v_sig = sound[i] + sound[j] - 3 * w_ij  # eq 25
+    # eq 24 prints one alpha; with one per particle the pair takes their mean
+    viscosity = -0.5 * 0.5 * (alpha[i] + alpha[j]) * v_sig * w_ij / (0.5 * (rho[i] + rho[j]))
+    viscosity *= 0.5 * (f[i] + f[j])
+    P = state["pressure"] / (state["omega"] * rho**2)
+    slopes = scene.force_slope(pairs.r, support[i]) + scene.force_slope(pairs.r, support[j])
+    m_dW = mass[j] / 2 * slopes
+    push = -(P[i] + P[j] + viscosity) * m_dW * pairs.unit  # eq 22
+    work = (P[i] + viscosity / 2) * m_dW * radial  # eq 23
+    fastest = np.zeros(n)
+    np.maximum.at(fastest, i, v_sig)
+    return {
+        "acceleration": pairs.sum(push, n),
+        "energy_rate": pairs.sum(work, n),
+        "signal_speed": fastest,
+        "acceleration_scale": pairs.sum(np.linalg.norm(push, axis=0), n),
+        "energy_rate_scale": pairs.sum(abs(work), n),
+        "signal_speed_scale": fastest,
+    }
+
+
+def _alpha_change(scene, alpha, state):
+    """Rate of change of alpha, eqs 27 and 28; zero where alpha is one number."""
+    if not isinstance(scene.alpha, dict):
+        return {"alpha_rate": np.zeros_like(alpha), "alpha_rate_scale": np.zeros_like(alpha)}
+    h = state["support"] / scene.h_ratio
+    decay = (alpha - scene.alpha["min"]) / (h / (0.25 * state["sound_speed"]))
+    room = scene.alpha["max"] - alpha
+    return {
+        "alpha_rate": np.maximum(-state["divergence"] * room, 0.0) - decay,
+        "alpha_rate_scale": state["divergence_scale"] * abs(room) + abs(decay),
+    }
+
+
+def _start_alpha(scene, count):
+    """(N,) alpha at t = 0: its minimum, or the one number."""
+    value = scene.alpha["min"] if isinstance(scene.alpha, dict) else scene.alpha
+    return np.full(count, float(value))
+
+
+def rates(scene, position, velocity, mass, internal_energy, support_guess, alpha=None) -> Rates:
+    """Steps 2-6 from position and the predicted velocity, (D, N), energy and alpha, (N,).
+
+    `support_guess` (N,) is the H the first density pass starts from; `alpha` defaults to that of
+    t = 0. ValueError where the energy is negative, H outgrows the box or eq 15 has no solution.
+    """
+    if np.any(internal_energy < 0):
+        raise ValueError("negative internal energy")
+    alpha = _start_alpha(scene, len(mass)) if alpha is None else alpha
+    state = _smoothing(scene, position, mass, np.asarray(support_guess, dtype=float))
+    # the pair set of eq 32's maximum; gradients vanish in it beyond their own H
+    pairs = _pairs(scene, position, state["support"], state["support"])
+    state |= _flow(scene, pairs, mass, velocity, state)
+    state |= _thermodynamics(scene, internal_energy, state)
+    state |= _forces(scene, pairs, mass, velocity, alpha, state)
+    state |= _alpha_change(scene, alpha, state)
+    return Rates(**state)
+
+
+class Moment(NamedTuple):
+    """A line of the history; `dt` is the step that led to it, 0 at the start."""
+
+    time: float
+    dt: float
+    kinetic: float
+    internal: float
+    momentum: np.ndarray  # (D,)
+
+
+@dataclass
+class State:
+    """Corrected values at `time`, the rates of the last step 2-6, and the next step by eq 32."""
+
+    time: float
+    position: np.ndarray
+    velocity: np.ndarray
+    mass: np.ndarray
+    internal_energy: np.ndarray
+    alpha: np.ndarray
+    rates: Rates
+    dt: float
+    history: list[Moment] = field(default_factory=list)
+
+
+def time_step(scene, internal_energy, now: Rates) -> float:
+    """Eq 32; `energy_limit` False leaves its u/|du/dt| out, as the draft does."""
+    limit = 2 * now.support / now.signal_speed
+    if scene.energy_limit:
+        with np.errstate(divide="ignore", invalid="ignore"):
+            cooling = internal_energy / abs(now.energy_rate)
+        limit = np.minimum(limit, np.where(now.energy_rate == 0, np.inf, cooling))
+    return scene.C * limit.min()
+
+
+def _moment(state, dt):
+    kinetic = 0.5 * (state.mass * (state.velocity**2).sum(axis=0)).sum()
+    internal = (state.mass * state.internal_energy).sum()
+    return Moment(state.time, dt, kinetic, internal, (state.mass * state.velocity).sum(axis=1))
+
+
+def start(scene, position, velocity, mass, internal_energy) -> State:
+    """The state at t = 0: converged H, then steps 2-6 with the values themselves."""
+    extent = np.ptp(position, axis=1).max()
+    guess = scene.eta * scene.h_ratio * extent / len(mass) ** (1 / scene.dimension)
+    converged = replace(scene, density_passes="converged")
+    now = rates(converged, position, velocity, mass, internal_energy, np.full(len(mass), guess))
+    dt = time_step(scene, internal_energy, now)
+    alpha = _start_alpha(scene, len(mass))
+    state = State(0.0, position, velocity, mass, internal_energy, alpha, now, dt)
+    state.history.append(_moment(state, 0.0))
+    return state
+
+
+def _into_box(scene, position, *velocities):
+    """Copies of the (D, N) arrays with the particles that left the box back in it.
+
+    Through a periodic face they come in at the other one; a mirror turns them back, velocities
+    with them: the image that has just come in is the particle.
+    """
+    position, *velocities = (array.copy() for array in (position, *velocities))
+    for axis, ((low, high), boundary) in enumerate(zip(scene.box, scene.boundaries, strict=True)):
+        x = position[axis]
+        if boundary == "periodic":
+            x += np.where(x < low, high - low, 0.0) - np.where(x >= high, high - low, 0.0)
+        elif boundary == "mirror":
+            out = (x < low) | (x > high)
+            x[out] = np.where(x[out] < low, 2 * low, 2 * high) - x[out]
+            for v in velocities:
+                v[axis, out] *= -1
+    return position, *velocities
+
+
+def _step(scene, state, dt) -> State:
+    """Steps 1-8 over dt; the time is set by the caller, the history is carried on."""
+    last, a, v, u = state.rates, state.rates.acceleration, state.velocity, state.internal_energy
+    position, v_half, v_tilde = _into_box(
+        scene,
+        state.position + v * dt + 0.5 * a * dt**2,  # eq 1
+        v + 0.5 * a * dt,  # eq 2
+        v + a * dt,  # eq 4
+    )
+    u_half = u + 0.5 * last.energy_rate * dt  # eq 3
+    u_tilde = u + last.energy_rate * dt  # eq 5
+    alpha_half = state.alpha + 0.5 * last.alpha_rate * dt  # used in eq 31, defined nowhere
+    alpha_tilde = state.alpha + last.alpha_rate * dt  # eq 6
+    now = rates(scene, position, v_tilde, state.mass, u_tilde, last.support, alpha_tilde)
+    velocity = v_half + 0.5 * now.acceleration * dt  # eq 29
+    energy = u_half + 0.5 * now.energy_rate * dt  # eq 30
+    alpha = alpha_half + 0.5 * now.alpha_rate * dt  # eq 31
+    return replace(
+        state,
+        position=position,
+        velocity=velocity,
+        internal_energy=energy,
+        alpha=alpha,
+        rates=now,
+        dt=time_step(scene, energy, now),
+    )
+
+
+def integrate(scene, state, end, outputs=()) -> State:
+    """Steps 1-9 until `end`, landing on each of `outputs` on the way; history by the step."""
+    history = list(state.history)
+    for stop in sorted({time for time in (*outputs, end) if state.time < time <= end}):
+        while state.time < stop:
+            lands = state.time + state.dt >= stop
+            dt = stop - state.time if lands else state.dt
+            time = stop if lands else state.time + dt
+            state = replace(_step(scene, state, dt), time=time)
+            history.append(_moment(state, dt))
+    return replace(state, history=history)
