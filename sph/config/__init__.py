@@ -7,8 +7,8 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, Field, model_validator
 
-from sph.config import reading, registry
-from sph.config import template as templates
+from sph import registry
+from sph.config import commented, reading
 from sph.config.choices import Choice, Gamma, ModelChoice
 from sph.config.errors import Issue, as_error, suggestion
 from sph.config.toml_text import key_text, value_text
@@ -174,7 +174,7 @@ def template(problem: str) -> str:
     if problem not in problems:
         raise ConfigError(f'there is no problem "{problem}"; {suggestion(problem, problems)}')
     default = from_text(f'[problem]\nname = "{problem}"\n')
-    return templates.text({name: getattr(default, name) for name in _names()})
+    return commented.text({name: getattr(default, name) for name in _names()})
 
 
 def _resolve(source: reading.Source, overrides: Sequence[str]) -> Config:
