@@ -1,0 +1,195 @@
+"""The public part of a checkpoint: groups that yt, pynbody and swiftsimio read.
+
+SWIFT's names and conventions, in code units. A one- or two-dimensional run is laid into three
+dimensions: its unused axes are as long as the longest used one and all particles lie in their
+middle, so that a slice through the middle of the box finds them.
+"""
+
+from collections.abc import Mapping
+from typing import NamedTuple
+
+import h5py
+import numpy as np
+
+from sph import kernels
+
+# Particles a chunk, 1 to 3 MB: the Fletcher-32 filter works by the chunk.
+LONGEST_CHUNK = 131_072
+
+CENTIMETRE_GRAM_SECOND = {
+    "Unit mass in cgs (U_M)": 1.0,
+    "Unit length in cgs (U_L)": 1.0,
+    "Unit time in cgs (U_t)": 1.0,
+    "Unit current in cgs (U_I)": 1.0,
+    "Unit temperature in cgs (U_T)": 1.0,
+}
+
+
+class Field(NamedTuple):
+    """A public dataset: exponents of its unit, of the cosmic scale factor, and what it is."""
+
+    length: int
+    mass: int
+    time: int
+    scale_factor: int
+    description: str
+
+
+FIELDS = {
+    "Coordinates": Field(1, 0, 0, 1, "Position from the corner of the box; add Header/Origin"),
+    "Velocities": Field(1, 0, -1, 0, "Velocity"),
+    "Masses": Field(0, 1, 0, 0, "Mass"),
+    "Densities": Field(-3, 1, 0, -3, "Density, per D-dimensional volume"),
+    "InternalEnergies": Field(2, 0, -2, -2, "Internal energy per unit mass"),
+    "SmoothingLengths": Field(1, 0, 0, 1, "Smoothing length h; the kernel ends at H = (H/h) h"),
+    "Pressures": Field(-1, 1, -2, -5, "Pressure"),
+    "ParticleIDs": Field(0, 0, 0, 0, "What stays with a particle, from 1"),
+    "ViscosityParameters": Field(0, 0, 0, 0, "Coefficient alpha of the artificial viscosity"),
+}
+
+# Names that yt knows; soft links, since pynbody does not list a field that is hard-linked twice.
+SINGULAR = {
+    "Density": "Densities",
+    "InternalEnergy": "InternalEnergies",
+    "SmoothingLength": "SmoothingLengths",
+    "Pressure": "Pressures",
+}
+
+
+class Frame(NamedTuple):
+    """A box from 0 to `size` whose corner is at `origin` in the run's own coordinates."""
+
+    origin: np.ndarray  # (3,)
+    size: np.ndarray  # (3,)
+
+
+def frame_of(problem, position: np.ndarray) -> Frame:
+    """The domain, with axes that are not periodic widened to hold all of (D, N) `position`."""
+    low, high = problem.box[:, 0].copy(), problem.box[:, 1].copy()
+    widened = np.array([boundary != "periodic" for boundary in problem.boundaries])
+    low[widened] = np.minimum(low, position.min(axis=1))[widened]
+    high[widened] = np.maximum(high, position.max(axis=1))[widened]
+    origin, size = np.zeros(3), np.full(3, (high - low).max())
+    origin[: low.size], size[: low.size] = low, high - low
+    return Frame(origin, size)
+
+
+def in_frame(frame: Frame, boundaries: tuple[str, ...], position: np.ndarray) -> np.ndarray:
+    """(N, 3) coordinates from 0 to frame.size of (D, N) `position`, periodic axes wrapped."""
+    coordinates = np.empty((position.shape[1], 3))
+    coordinates[:] = frame.size / 2
+    for axis, boundary in enumerate(boundaries):
+        x = position[axis] - frame.origin[axis]
+        if boundary == "periodic":
+            x %= frame.size[axis]
+            # the remainder of a number just below 0 rounds up to the size itself
+            x[x >= frame.size[axis]] = 0.0
+        coordinates[:, axis] = x
+    return coordinates
+
+
+def write_public(file: h5py.File, checkpoint) -> None:
+    """Write all public groups of `checkpoint` (a sph.output.checkpoint.Checkpoint)."""
+    particles, problem = checkpoint.particles, checkpoint.config.problem
+    frame = frame_of(problem, particles.position)
+    _write_attributes(file, _header(checkpoint, frame))
+    group = file.create_group("PartType0")
+    for name, array in _fields(checkpoint, frame).items():
+        dataset = write_array(group, name, array)
+        dataset.attrs.update(_unit_attributes(FIELDS[name]))
+    for link, target in SINGULAR.items():
+        group[link] = h5py.SoftLink(f"/PartType0/{target}")
+
+
+def write_array(group: h5py.Group, name: str, array: np.ndarray) -> h5py.Dataset:
+    """A dataset in which damage is found when it is read (Fletcher-32)."""
+    chunks = tuple(min(length, LONGEST_CHUNK) for length in array.shape)
+    return group.create_dataset(name, data=array, chunks=chunks, fletcher32=True)
+
+
+def _fields(checkpoint, frame: Frame) -> dict[str, np.ndarray]:
+    config, particles = checkpoint.config, checkpoint.particles
+    kernel = config.physics.kernel_model()
+    velocity = np.zeros((particles.number, 3))
+    velocity[:, : particles.dimension] = particles.velocity.T
+    fields = {
+        "Coordinates": in_frame(frame, config.problem.boundaries, particles.position),
+        "Velocities": velocity,
+        "Masses": particles.mass,
+        "Densities": particles.density,
+        "InternalEnergies": particles.internal_energy,
+        "SmoothingLengths": particles.support / kernels.support_ratio(kernel, particles.dimension),
+        "Pressures": checkpoint.pressure,
+        "ParticleIDs": particles.id,
+    }
+    if particles.alpha is not None:
+        fields["ViscosityParameters"] = particles.alpha
+    return fields
+
+
+def _header(checkpoint, frame: Frame) -> dict[str, Mapping]:
+    """Attributes of each group that holds nothing else."""
+    physics, dimension = checkpoint.config.physics, checkpoint.particles.dimension
+    kernel = physics.kernel if isinstance(physics.kernel, str) else physics.kernel["name"]
+    # Six kinds of particle, gas first: yt reads six and no more.
+    number = np.array([checkpoint.particles.number, 0, 0, 0, 0, 0])
+    return {
+        "Header": {
+            "BoxSize": frame.size,
+            "Origin": frame.origin,
+            "NumPart_ThisFile": number,
+            "NumPart_Total": (number & 0xFFFFFFFF).astype(np.uint32),
+            "NumPart_Total_HighWord": (number >> 32).astype(np.uint32),
+            "MassTable": np.zeros(6),
+            "NumFilesPerSnapshot": np.array([1]),
+            "ThisFile": np.array([0]),
+            "Time": np.array([checkpoint.time]),
+            "Redshift": np.array([0.0]),
+            "Scale-factor": np.array([1.0]),
+            "Dimension": np.array([3]),  # pynbody takes no other; the true one is in HydroScheme
+            "Flag_Entropy_ICs": np.array([0]),
+        },
+        "Units": _one_element(CENTIMETRE_GRAM_SECOND),
+        "InternalCodeUnits": _one_element(CENTIMETRE_GRAM_SECOND),
+        "Cosmology": {"Cosmological run": np.array([0])},
+        "Policy": {"cosmological integration": np.array([0])},
+        # scalars, for yt, which knows cubic boxes only
+        "Parameters": {
+            "BoxSize": frame.size.max(),
+            "Omega0": 0.0,
+            "OmegaLambda": 0.0,
+            "HubbleParam": 1.0,
+        },
+        "HydroScheme": {
+            "Adiabatic index": np.array([physics.eos_model().gamma]),
+            "Dimension": np.array([dimension]),
+            "Scheme": np.bytes_(physics.scheme),
+            "Kernel function": np.bytes_(kernel),
+            "Kernel eta": np.array([physics.eta]),
+            "CFL parameter": np.array([physics.C]),
+        },
+    }
+
+
+def _write_attributes(file: h5py.File, groups: Mapping[str, Mapping]) -> None:
+    for name, attributes in groups.items():
+        file.create_group(name).attrs.update(attributes)
+
+
+def _one_element(numbers: Mapping[str, float]) -> dict[str, np.ndarray]:
+    return {name: np.array([number]) for name, number in numbers.items()}
+
+
+def _unit_attributes(field: Field) -> dict:
+    return _one_element(
+        {
+            "U_L exponent": float(field.length),
+            "U_M exponent": float(field.mass),
+            "U_t exponent": float(field.time),
+            "U_I exponent": 0.0,
+            "U_T exponent": 0.0,
+            "a-scale exponent": float(field.scale_factor),
+            "h-scale exponent": 0.0,
+            "Conversion factor to CGS (not including cosmological corrections)": 1.0,
+        }
+    ) | {"Description": np.bytes_(field.description)}

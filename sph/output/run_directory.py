@@ -1,0 +1,191 @@
+"""The directory of a run: where everything is, and what may be replaced."""
+
+import json
+import math
+import os
+import re
+import shutil
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from sph.errors import FileError
+from sph.output import checkpoint
+from sph.output.files import explained, is_unfinished, remove_unfinished, write_text
+
+CHECKPOINT_NAME = re.compile(r"checkpoint_(\d{6,})\.h5")
+
+# First line of config.toml: what tells a run directory from a user's folder of the same look,
+# before --force may remove anything from it.
+MARK = "# The resolved configuration of a run of sph.\n"
+
+
+@dataclass(frozen=True)
+class RunDirectory:
+    """Paths in a run directory, none of which need exist but `path` and its checkpoints/."""
+
+    path: Path
+
+    @classmethod
+    def create(cls, path: Path, force: bool = False) -> "RunDirectory":
+        """An empty run directory at `path`, its parents made where they are missing.
+
+        With `force` an earlier run there is removed, but nothing that is not of that run.
+        Raises FileError where there is something else, or an earlier run and no force.
+        """
+        run = cls(Path(path))
+        with explained(f"cannot write to {path}"):
+            if run.path.exists() and not run.path.is_dir():
+                raise FileError(f"{path} is a file.\nTry: another directory, with -o.")
+            if run.path.is_dir() and not _holds_nothing(run.path):
+                run._make_room(force)
+            run._checkpoint_directory.mkdir(parents=True, exist_ok=True)
+            run._remove_unfinished()
+        return run
+
+    @classmethod
+    def open(cls, path: Path) -> "RunDirectory":
+        """The run directory at `path`. Raises FileError where there is none."""
+        run = cls(Path(path))
+        if not run._checkpoint_directory.is_dir():
+            there = "is not a run directory" if run.path.exists() else "does not exist"
+            raise FileError(f"{path} {there}.\nTry: the directory that `sph run` named, with -o.")
+        return run
+
+    @property
+    def config(self) -> Path:
+        return self.path / "config.toml"
+
+    @property
+    def history(self) -> Path:
+        return self.path / "history.csv"
+
+    @property
+    def summary(self) -> Path:
+        return self.path / "summary.json"
+
+    @property
+    def figures(self) -> Path:
+        return self.path / "figures"
+
+    @property
+    def diagnostics(self) -> Path:
+        return self.path / "diagnostics"
+
+    @property
+    def _checkpoint_directory(self) -> Path:
+        return self.path / "checkpoints"
+
+    def checkpoint_path(self, number: int) -> Path:
+        """Where checkpoint `number`, from 0, is or will be."""
+        return self._checkpoint_directory / f"checkpoint_{number:06d}.h5"
+
+    def checkpoints(self) -> list[Path]:
+        """The checkpoints that are there, by number."""
+        found = self._checkpoint_directory.iterdir()
+        named = [path for path in found if checkpoint_number(path) is not None]
+        return sorted(named, key=checkpoint_number)
+
+    def latest(self) -> Path:
+        """The last checkpoint that can be read. Raises FileError where there is none."""
+        reason = "it has no checkpoints"
+        for path in reversed(self.checkpoints()):
+            try:
+                checkpoint.read(path)
+            except FileError as error:
+                reason = str(error)
+            else:
+                return path
+        raise FileError(f"{self.path} cannot be restarted: {reason}")
+
+    def drop_checkpoints_after(self, number: int) -> None:
+        """Remove later checkpoints, and what a killed run left unfinished. Raises FileError."""
+        with explained(f"cannot remove checkpoints of {self.path}"):
+            for path in self.checkpoints():
+                if checkpoint_number(path) > number:
+                    path.unlink()
+            self._remove_unfinished()
+
+    def write_config(self, text: str) -> None:
+        """Write config.toml, all or nothing. Raises FileError."""
+        write_text(self.config, MARK + text)
+
+    def write_summary(self, summary: Mapping) -> None:
+        """Write summary.json, all or nothing; "nan", "inf" and "-inf" are strings there.
+
+        Raises FileError, and TypeError for what has no place in JSON.
+        """
+        text = json.dumps(_plain(summary), indent=2, ensure_ascii=False, allow_nan=False)
+        write_text(self.summary, text + "\n")
+
+    def _make_room(self, force: bool) -> None:
+        if not _is_run(self):
+            raise FileError(
+                f"{self.path} is not a run directory, and it holds other things.\n"
+                "Try: a new directory, with -o."
+            )
+        if not force:
+            raise FileError(
+                f"{self.path} holds a run already.\nTry: --force to replace it, "
+                f"`sph restart {self.path}` to go on with it, or another directory with -o."
+            )
+        for tree in (self.figures, self.diagnostics):
+            if tree.is_dir() and not tree.is_symlink():
+                shutil.rmtree(tree)
+        for path in (self.history, self.summary, *self.checkpoints()):
+            path.unlink(missing_ok=True)
+        self.write_config("")  # its mark stays: beside a user's files this is still a run directory
+
+    def _remove_unfinished(self) -> None:
+        for directory in (self.path, self._checkpoint_directory):
+            remove_unfinished(directory)
+
+
+def checkpoint_number(path: Path) -> int | None:
+    """The number in a checkpoint's name, or None where it is no such name."""
+    name = CHECKPOINT_NAME.fullmatch(path.name)
+    return int(name[1]) if name else None
+
+
+def find(run_or_checkpoint: Path) -> tuple[RunDirectory | None, Path]:
+    """What to restart from: a run directory's last good checkpoint, or that very checkpoint.
+
+    The run directory is None for a checkpoint that is in none. Raises FileError.
+    """
+    path = Path(run_or_checkpoint)
+    if path.is_dir():
+        run = RunDirectory.open(path)
+        return run, run.latest()
+    if not path.exists():
+        raise FileError(f"{path} does not exist.\nTry: a run directory, or a checkpoint in one.")
+    run = RunDirectory(path.absolute().parent.parent)
+    inside = checkpoint_number(path) is not None and path.absolute().parent.name == "checkpoints"
+    return (run if inside and _is_run(run) else None), path
+
+
+def _is_run(run: RunDirectory) -> bool:
+    try:
+        marked = run.config.read_bytes().startswith(MARK.encode())
+    except OSError:
+        return False
+    return marked and run.path.joinpath("checkpoints").is_dir()
+
+
+def _holds_nothing(directory: Path) -> bool:
+    """No file but unfinished ones: empty, or what a run left that died before it began."""
+    return all(is_unfinished(name) for _, _, files in os.walk(directory) for name in files)
+
+
+def _plain(value):
+    """`value` in JSON's own types."""
+    if isinstance(value, Mapping):
+        return {str(name): _plain(inner) for name, inner in value.items()}
+    if isinstance(value, np.ndarray | np.generic):
+        return _plain(value.tolist())
+    if isinstance(value, list | tuple):
+        return [_plain(inner) for inner in value]
+    if isinstance(value, float) and not math.isfinite(value):
+        return str(value)
+    return value

@@ -1,0 +1,183 @@
+import json
+import os
+
+import numpy as np
+import pytest
+
+from sph.errors import FileError
+from sph.output import checkpoint
+from sph.output.run_directory import RunDirectory, find
+
+
+def tree(path):
+    """All files below `path`."""
+    return {str(each.relative_to(path)) for each in path.rglob("*") if each.is_file()}
+
+
+@pytest.fixture
+def run(tmp_path):
+    run = RunDirectory.create(tmp_path / "runs" / "sod")
+    run.write_config("[problem]\n")
+    return run
+
+
+@pytest.fixture
+def finished(run, make_state):
+    for number in range(3):
+        checkpoint.write(run.checkpoint_path(number), make_state())
+    run.write_summary({"steps": 3})
+    run.history.write_text("step,t\n")
+    for directory in (run.figures, run.diagnostics):
+        directory.mkdir()
+        (directory / "file").touch()
+    return run
+
+
+def test_names_and_missing_parents(run, tmp_path):
+    assert run.path == tmp_path / "runs" / "sod"
+    assert run.config == run.path / "config.toml"
+    assert run.history == run.path / "history.csv"
+    assert run.summary == run.path / "summary.json"
+    assert run.checkpoint_path(12) == run.path / "checkpoints" / "checkpoint_000012.h5"
+    assert run.checkpoints() == []
+
+
+def test_empty_directory_and_what_died_before_it_began_are_taken(tmp_path):
+    (tmp_path / "checkpoints").mkdir()
+    (tmp_path / ".config.toml.partial").touch()
+    RunDirectory.create(tmp_path)
+    assert tree(tmp_path) == set()
+
+
+def test_a_run_is_not_overwritten_without_force(finished):
+    before = tree(finished.path)
+    with pytest.raises(FileError) as caught:
+        RunDirectory.create(finished.path)
+    assert "--force" in str(caught.value)
+    assert f"sph restart {finished.path}" in str(caught.value)
+    assert tree(finished.path) == before
+
+
+def test_force_removes_that_run_and_nothing_of_the_users(finished):
+    theirs = {"notes.txt", "checkpoints/mine.h5", "more/config.toml", "checkpoints/checkpoint_1.h5"}
+    (finished.path / "more").mkdir()
+    for name in theirs:
+        (finished.path / name).touch()
+    (finished.path / ".history.csv.partial").touch()
+    RunDirectory.create(finished.path, force=True)
+    assert tree(finished.path) == theirs | {"config.toml"}
+    # and it is still known as a run, so that it can be forced again
+    RunDirectory.create(finished.path, force=True)
+
+
+def test_force_leaves_a_linked_directory_of_figures_alone(finished, tmp_path):
+    elsewhere = tmp_path / "elsewhere"
+    finished.figures.rename(elsewhere)
+    finished.figures.symlink_to(elsewhere)
+    RunDirectory.create(finished.path, force=True)
+    assert (elsewhere / "file").exists()
+
+
+@pytest.mark.parametrize("force", [False, True])
+@pytest.mark.parametrize("names", [["notes.txt"], ["config.toml", "checkpoints/a.pt", "figures/a"]])
+def test_a_directory_of_something_else_is_refused(tmp_path, names, force):
+    for name in names:
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+        (tmp_path / name).touch()
+    with pytest.raises(FileError, match="not a run directory"):
+        RunDirectory.create(tmp_path, force)
+    assert tree(tmp_path) == set(names)
+
+
+@pytest.mark.parametrize("below", ["", "run", "a/b/run"])
+def test_a_place_that_cannot_be_written(tmp_path, below):
+    (tmp_path / "file").touch()
+    with pytest.raises(FileError, match=r"(?s)file.*\nTry: ") as caught:
+        RunDirectory.create(tmp_path / "file" / below)
+    assert caught.value.exit_code == 4
+
+
+def test_open(run, tmp_path):
+    assert RunDirectory.open(str(run.path)) == run
+    with pytest.raises(FileError, match="does not exist"):
+        RunDirectory.open(tmp_path / "no")
+    with pytest.raises(FileError, match="is not a run directory"):
+        RunDirectory.open(tmp_path)
+
+
+def test_checkpoints_are_sorted_by_number_and_nothing_else_is_one(run):
+    names = ["checkpoint_1000000.h5", "checkpoint_000002.h5", "checkpoint_000010.h5"]
+    for name in [*names, ".checkpoint_000011.h5.partial", "checkpoint_3.h5", "a.h5"]:
+        (run.path / "checkpoints" / name).touch()
+    found = [path.name for path in run.checkpoints()]
+    assert found == ["checkpoint_000002.h5", "checkpoint_000010.h5", "checkpoint_1000000.h5"]
+
+
+def test_drop_checkpoints_after(finished):
+    (finished.path / "checkpoints" / ".checkpoint_000003.h5.partial").touch()
+    (finished.path / ".summary.json.partial").touch()
+    before = tree(finished.path)
+    finished.drop_checkpoints_after(1)
+    gone = before - tree(finished.path)
+    assert gone == {
+        "checkpoints/checkpoint_000002.h5",
+        "checkpoints/.checkpoint_000003.h5.partial",
+        ".summary.json.partial",
+    }
+
+
+def test_find_takes_the_last_checkpoint_that_is_good(finished):
+    assert find(finished.path) == (finished, finished.checkpoint_path(2))
+    content = finished.checkpoint_path(2).read_bytes()
+    finished.checkpoint_path(2).write_bytes(content[:-100])
+    assert find(finished.path) == (finished, finished.checkpoint_path(1))
+    for number in range(2):
+        finished.checkpoint_path(number).write_bytes(b"")
+    with pytest.raises(FileError, match="cannot be restarted"):
+        find(finished.path)
+
+
+def test_find_in_a_run_without_checkpoints(run):
+    with pytest.raises(FileError, match="it has no checkpoints"):
+        find(run.path)
+
+
+def test_find_takes_a_checkpoint_with_its_run(finished, tmp_path, monkeypatch):
+    path = finished.checkpoint_path(1)
+    assert find(str(path)) == (finished, path)
+    monkeypatch.chdir(path.parent)
+    assert find(path.name)[0] == finished
+    alone = tmp_path / path.name
+    os.link(path, alone)
+    assert find(alone) == (None, alone)
+    with pytest.raises(FileError, match="does not exist"):
+        find(finished.checkpoint_path(9))
+
+
+def test_summary_is_valid_json_of_plain_numbers(run):
+    run.write_summary(
+        {
+            "l1": {"density": np.float64(0.1), "steps": np.int64(3)},
+            "values": np.array([1.0, np.nan]),
+            "ratio": float("inf"),
+            "names": ("Δt", True, None),
+        }
+    )
+
+    def refuse(constant):
+        raise AssertionError(f"{constant} is not JSON")
+
+    assert json.loads(run.summary.read_text(), parse_constant=refuse) == {
+        "l1": {"density": 0.1, "steps": 3},
+        "values": [1.0, "nan"],
+        "ratio": "inf",
+        "names": ["Δt", True, None],
+    }
+
+
+def test_configuration_reads_back(run, make_state):
+    from sph import config
+
+    text = make_state().config.to_toml(include_run=True)
+    run.write_config(text)
+    assert config.load(run.config) == config.from_text(text)
