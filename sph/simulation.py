@@ -188,9 +188,7 @@ class Simulation:
         with self.clock.phase("lists"):
             if guess:
                 models = self.scene.models
-                p.support = first_guess(
-                    p.position, self.scene.dimension, models.support_ratio * models.eta
-                )
+                p.support = first_guess(p.position, models.support_ratio * models.eta)
             skin = self.search.skin_for(self._velocity, p.support, dt)
             self.search.build(Origin(p.position.copy(), p.support.copy(), skin), p.id)
 

@@ -8,6 +8,7 @@ from numba import njit
 from sph.compiled import COMPILED
 from sph.errors import NumericalError
 from sph.neighbours import lists, order, tree
+from sph.neighbours.order import BLOCK
 
 # Room for supports to grow between two builds. Where it falls short the pass is done once more.
 GROWTH = 0.03
@@ -116,25 +117,37 @@ class Search:
 
     def widen(self, position, wanted, identity) -> None:
         """List particles where they are now, to `wanted` (blocks,) times the list support."""
-        factor = np.repeat(np.maximum(wanted, 1.0), order.BLOCK)[: identity.size]
+        factor = np.repeat(np.maximum(wanted, 1.0), BLOCK)[: identity.size]
         support = self.origin.support * factor
         self.build(Origin(position.copy(), support, self.origin.skin), identity)
 
 
-def first_guess(position, dimension: int, ratio: float) -> np.ndarray:
+@njit(**COMPILED)
+def _spacing(position, a, b):
+    """Spacing s of the n particles [a, b): along axes s apart, they span prod (e + s) = n s^D."""
+    D = position.shape[0]
+    extent = np.empty(D)
+    for d in range(D):
+        extent[d] = np.ptp(position[d, a:b])
+    spacing = extent.max()
+    for _ in range(30):  # a contraction: each pass halves the error at the least
+        spacing = (np.prod(extent + spacing) / (b - a)) ** (1 / D)
+    return spacing
+
+
+@njit(**COMPILED)
+def first_guess(position, ratio):
     """Supports to begin the search of the true ones with, (N,), for positions in block order.
 
-    ratio = (H/h) eta times the spacing, taken from the boxes of four or more blocks together.
+    ratio = (H/h) eta times the spacing of the particle's block.
     """
     n = position.shape[1]
-    group = min(4 * order.BLOCK, n)
+    # where particles coincide there is no spacing to be seen: begin from a small support
+    least = 1e-6 * _spacing(position, 0, n)
     guess = np.empty(n)
-    for a in range(0, n, group):
-        a = min(a, n - group)
-        part = position[:, a : a + group]
-        extent = np.ptp(part, axis=1)
-        # a flat or linear arrangement has no volume: count its thin axes as one spacing wide
-        extent = np.maximum(extent, max(extent.max(), 1e-300) / group)
-        spacing = (np.prod(extent) / group) ** (1 / dimension)
-        guess[a : a + group] = ratio * spacing * (1 + group ** (-1 / dimension))
+    for a in range(0, n, BLOCK):
+        # one particle alone spans nothing: count it with the block before
+        begin = a if a + 1 < n else max(0, a - BLOCK)
+        end = min(a + BLOCK, n)
+        guess[a:end] = ratio * max(_spacing(position, begin, end), least)
     return guess
