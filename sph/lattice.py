@@ -124,9 +124,9 @@ def _wrapped(position: np.ndarray, box: np.ndarray) -> np.ndarray:
 
 
 # Repulsion of the glass: reach and strength of a sweep in spacings. Measured with Wendland C2 at
-# eta = 1.6, the density then scatters by 0.5 % in 2-D and 0.2 % in 3-D (10 % and 7 % before), and no
-# two particles are nearer than 0.85 spacings. A reach of 1.6 leaves 0.9 % and 0.6 %; 100 sweeps take
-# 1.7 times as long for 0.4 % and 0.2 %.
+# eta = 1.6: the density then scatters by 0.5 % in 2-D and 0.2 % in 3-D (10 % and 7 % before), and
+# no two particles are nearer than 0.85 spacings. A reach of 1.6 leaves 0.9 % and 0.6 %; 100 sweeps
+# take 1.7 times as long for 0.4 % and 0.2 %.
 _REACH, _STRENGTH, _SWEEPS = 2.0, 0.5, 60
 
 
