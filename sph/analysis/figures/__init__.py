@@ -1,0 +1,108 @@
+"""Pictures of runs and checkpoints: `draw` decides which, the modules beside it draw one each."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from matplotlib.figure import Figure
+
+from sph.analysis.figures import history, maps, profiles, style
+from sph.analysis.figures.sources import Source, State, find_source, labels
+from sph.errors import ConfigError
+from sph.output.files import explained, replacing
+from sph.output.history import read as read_history
+
+FORMATS = ("png", "pdf", "svg")
+MOST_TIMES = 6
+
+
+def draw(sources: Sequence[Path], target: Path | None = None) -> list[Path]:
+    """Draw runs or checkpoints; returns the files written.
+
+    Without `target` a run gets a set of pictures in its figures/, a checkpoint one picture there,
+    or beside it where it is in no run. With `target` the main picture of one source goes there, or
+    one picture that compares several; its suffix says in which format.
+    Raises ConfigError for a suffix that is none of FORMATS and for sources that one picture cannot
+    compare, FileError for what is missing, damaged or cannot be written.
+    """
+    if target is not None:
+        _check_format(Path(target))
+    found = [find_source(Path(path)) for path in sources]
+    with style.paper():
+        if target is None:
+            return [path for source in found for path in _draw_own(source)]
+        states = [source.last() for source in found]
+        if len(found) == 1:
+            return [_save(main_picture(states[0]), Path(target))]
+        return [_save(comparison(states, labels(found)), Path(target))]
+
+
+def main_picture(state: State) -> Figure:
+    """Profiles beside the exact solution where there is one, else a map."""
+    return profiles.single(state) if _shows_profiles(state) else maps.single(state)
+
+
+def comparison(states: Sequence[State], names: Sequence[str]) -> Figure:
+    """Profiles over each other, or maps side by side. Raises ConfigError where they do not fit."""
+    kinds = {_kind(state) for state in states}
+    if len(kinds) > 1:
+        raise ConfigError(
+            f"one picture cannot compare {' with '.join(sorted(kinds))}.\n"
+            "Try: runs of one problem, or leave out -o for pictures of each."
+        )
+    compared = profiles.compared if _shows_profiles(states[0]) else maps.compared
+    return compared(states, names)
+
+
+def _kind(state: State) -> str:
+    if not _shows_profiles(state):
+        return "maps"
+    return "profiles over the radius" if state.is_radial else "profiles along x"
+
+
+def _shows_profiles(state: State) -> bool:
+    return state.dimension == 1 or state.has_exact
+
+
+def _draw_own(source: Source) -> list[Path]:
+    """The pictures of one source, where they belong."""
+    if not source.is_run:
+        directory = source.path.parent if source.run is None else source.run.figures
+        return [_save(main_picture(source.last()), directory / f"{source.path.stem}.png")]
+    return [
+        _save(picture, source.run.figures / f"{name}.png") for name, picture in _pictures(source)
+    ]
+
+
+def _pictures(source: Source):
+    """(name, figure) of each picture of a run's set, one at a time to hold one in memory."""
+    last = source.last()
+    states = source.over_time(MOST_TIMES)
+    if _shows_profiles(last) or last.dimension == 3:
+        yield "profiles", profiles.single(last)
+    if last.dimension == 1:
+        yield "evolution", profiles.over_time(list(states))
+    else:
+        yield "slice" if last.dimension == 3 else "map", maps.single(last)
+        yield "evolution", maps.over_time(states)
+    if source.run.history.exists():
+        steps = read_history(source.run.history)
+        if steps["t"].size:
+            yield "history", history.figure(steps, last.title)
+
+
+def _check_format(target: Path) -> None:
+    if target.suffix.lower().lstrip(".") not in FORMATS:
+        raise ConfigError(
+            f"{target} names no format that a picture can have.\n"
+            f"Try: a name that ends in .{', .'.join(FORMATS[:-1])} or .{FORMATS[-1]}."
+        )
+
+
+def _save(figure: Figure, path: Path) -> Path:
+    """Write `figure`, all or nothing; the directory figures/ is made where it is missing."""
+    if path.parent.name == "figures":
+        with explained(f"cannot write {path}"):
+            path.parent.mkdir(exist_ok=True)
+    with replacing(path) as unfinished:
+        figure.savefig(unfinished, format=path.suffix.lower().lstrip("."), bbox_inches="tight")
+    return path

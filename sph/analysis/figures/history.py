@@ -1,0 +1,93 @@
+"""What a run kept and what its steps were, from its history."""
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from sph.analysis.figures import style
+from sph.integrators.step_size import CRITERIA
+from sph.output.history import columns as shared_columns
+
+ENERGIES = (
+    ("total_energy", "total", "black", "-"),
+    ("internal_energy", "internal", style.PALETTE[1], "--"),
+    ("kinetic_energy", "kinetic", style.PALETTE[0], "-."),
+)
+STYLES = ("-", "--", "-.")
+
+
+def figure(history: dict[str, np.ndarray], title: str) -> Figure:
+    """Energies, their drift, momentum, steps by what limited them, and the problem's diagnostics.
+
+    `history` is that of `sph.output.history.read`.
+    """
+    momentum = [name for name in history if name.startswith("momentum_")]
+    further = [name for name in history if name not in shared_columns(len(momentum))]
+    picture, panels = _panels(4 + len(further))
+    _energies(panels[0], history)
+    _drift(panels[1], history)
+    _momentum(panels[2], history, momentum)
+    _steps(panels[3], history)
+    for panel, name in zip(panels[4:], further, strict=True):
+        _diagnostic(panel, history, name)
+    for panel in panels:
+        if panel.get_subplotspec().is_last_row():
+            panel.set_xlabel("$t$")
+        panel.margins(x=0.02)
+    picture.suptitle(title)
+    return picture
+
+
+def _panels(count: int):
+    """A figure and `count` panels in rows of two; an odd one at the end is twice as wide."""
+    rows = (count + 1) // 2
+    picture = style.new_figure(7.2, 2.6 * rows + 0.4)
+    grid = picture.add_gridspec(rows, 2)
+    cells = [grid[i // 2, i % 2] for i in range(count)]
+    if count % 2:
+        cells[-1] = grid[-1, :]
+    return picture, [picture.add_subplot(cell) for cell in cells]
+
+
+def _energies(panel, history) -> None:
+    for name, label, colour, dashes in ENERGIES:
+        panel.plot(history["t"], history[name], dashes, color=colour, label=label)
+    panel.set_ylabel("$E$")
+    panel.legend(loc="best")
+
+
+def _drift(panel, history) -> None:
+    energy = history["total_energy"]
+    panel.plot(history["t"], energy / energy[0] - 1.0, color=style.PALETTE[0])
+    panel.set_ylabel(r"$(E - E_0)\,/\,E_0$")
+
+
+def _momentum(panel, history, names) -> None:
+    for name, colour, dashes in zip(names, style.PALETTE, STYLES, strict=False):
+        change = history[name] - history[name][0]
+        panel.plot(history["t"], change, dashes, color=colour, label=f"${name[-1]}$")
+    panel.set_ylabel(r"$\mathbf{p} - \mathbf{p}_0$" if len(names) > 1 else "$p - p_0$")
+    if len(names) > 1:
+        panel.legend(loc="best")
+
+
+def _steps(panel, history) -> None:
+    for limiter, colour in zip(CRITERIA, style.PALETTE, strict=False):
+        by = history["limiter"] == limiter
+        if not by.any():
+            continue
+        panel.plot(
+            history["t"][by], history["dt"][by], ".", ms=3, mew=0, color=colour,
+            label=limiter.replace("_", " "), rasterized=True,
+        )  # fmt: skip
+    if history["dt"].max() > 10.0 * history["dt"].min():
+        panel.set_yscale("log")
+    panel.set_ylabel(r"$\Delta t$")
+    panel.legend(loc="best", markerscale=3.0, title="limited by")
+
+
+def _diagnostic(panel, history, name: str) -> None:
+    values = history[name]
+    panel.plot(history["t"], values, color=style.PALETTE[0])
+    panel.set_ylabel(name.replace("_", " "))
+    if np.all(values > 0.0) and np.ptp(values) > 0.0:
+        panel.set_yscale("log")

@@ -1,0 +1,141 @@
+"""Maps of 2-D runs and slices through the middle of 3-D runs, interpolated with the kernel."""
+
+from collections.abc import Iterable, Sequence
+from typing import NamedTuple
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from sph.analysis.figures import style
+from sph.analysis.figures.sources import State
+from sph.analysis.interpolate import Plane, onto_plane
+
+PIXELS = 512  # on the longer side
+PIXELS_OF_MANY = 320
+LONGEST_SIDE = 3.6  # inches, of a map that stands with one other
+WIDEST = 9.0  # inches, of a picture of many maps
+
+
+def single(state: State) -> Figure:
+    """Density and a second field at one time."""
+    names = ("density", second_field(state))
+    plane = plane_of(state, PIXELS)
+    images = _images(state, names, plane)
+    columns, width, height = _arrangement(plane, 2, 2 * LONGEST_SIDE)
+    figure = style.new_figure(columns * (width + 1.0), 2 // columns * height + 1.0, "compressed")
+    panels = figure.subplots(2 // columns, columns, squeeze=False)
+    for panel, name, values in zip(panels.flat, names, images, strict=True):
+        image = _show(panel, values, plane, name, style.scale(values))
+        figure.colorbar(image, ax=panel, pad=0.02, extend=_extends(image))
+        panel.set_title(f"{name} {style.SYMBOLS[name]}")
+    _label_axes(panels, 2)
+    figure.suptitle(f"{state.title}, {state.when}{_where(plane)}")
+    return figure
+
+
+def over_time(states: Iterable[State]) -> Figure:
+    """Density of one run at several times, in one scale of colours."""
+    drawn = [_density(state, state.when, state.title) for state in states]
+    return _side_by_side(drawn)
+
+
+def compared(states: Iterable[State], labels: Sequence[str]) -> Figure:
+    """Density of several runs, in one scale of colours."""
+    pairs = zip(states, labels, strict=True)
+    drawn = [
+        _density(state, f"{style.plain(label)}, {state.when}", state.name) for state, label in pairs
+    ]
+    return _side_by_side(drawn)
+
+
+def second_field(state: State) -> str:
+    """Pressure where it varies by more than a factor 2; nearer to balance, speed tells more."""
+    low, high = np.percentile(state.scalar("pressure"), [1, 99])
+    return "pressure" if high > 2.0 * low else "speed"
+
+
+def plane_of(state: State, pixels: int) -> Plane:
+    """The domain, or the middle of a 3-D one; along open axes as far as nearly all gas has gone."""
+    box = state.problem.box.copy()
+    for axis, boundary in enumerate(state.problem.boundaries):
+        if boundary == "open":
+            low, high = np.percentile(state.particles.position[axis], [0.1, 99.9])
+            box[axis] = min(box[axis, 0], low), max(box[axis, 1], high)
+    return Plane.through_centre(box, pixels)
+
+
+class _Density(NamedTuple):
+    """A map of density, which takes less memory than the state it is of."""
+
+    values: np.ndarray  # (ny, nx)
+    plane: Plane
+    label: str
+    what: str  # for the title
+
+
+def _density(state: State, label: str, what: str) -> _Density:
+    plane = plane_of(state, PIXELS_OF_MANY)
+    (values,) = _images(state, ["density"], plane)
+    return _Density(values, plane, label, what + _where(plane))
+
+
+def _side_by_side(drawn: Sequence[_Density]) -> Figure:
+    scale = style.scale(np.concatenate([one.values.ravel() for one in drawn]))
+    columns, width, height = _arrangement(drawn[0].plane, len(drawn), WIDEST)
+    rows = -(-len(drawn) // columns)
+    figure = style.new_figure(columns * width + 1.2, rows * (height + 0.35) + 0.8, "compressed")
+    panels = figure.subplots(rows, columns, squeeze=False)
+    for panel, one in zip(panels.flat, drawn, strict=False):
+        image = _show(panel, one.values, one.plane, "density", scale)
+        panel.set_title(one.label)
+    shown, empty = np.split(panels.ravel(), [len(drawn)])
+    for panel in empty:
+        panel.remove()
+    _label_axes(panels, len(drawn))
+    bar = figure.colorbar(image, ax=list(shown), pad=0.015, aspect=30, extend=_extends(image))
+    bar.ax.set_title(style.SYMBOLS["density"])
+    figure.suptitle("; ".join(sorted({one.what for one in drawn})))
+    return figure
+
+
+def _images(state: State, names: Sequence[str], plane: Plane) -> np.ndarray:
+    values = np.stack([state.scalar(name) for name in names])
+    return onto_plane(values, state.particles, state.domain, state.kernel, plane)
+
+
+def _show(panel, values, plane: Plane, name: str, scale):
+    panel.set_facecolor(style.VACUUM)
+    return panel.imshow(
+        values, origin="lower", extent=plane.extent, cmap=style.MAPS[name], norm=scale,
+        aspect="equal",
+    )  # fmt: skip
+
+
+def _extends(image) -> str:
+    """Which end of the scale cuts values off: the lower one of a map of many decades."""
+    return "min" if np.nanmin(image.get_array()) < image.norm.vmin else "neither"
+
+
+def _arrangement(plane: Plane, count: int, widest: float) -> tuple[int, float, float]:
+    """Columns, and inches of a map: wide maps above each other, others in rows of up to three."""
+    sides = plane.high - plane.low
+    columns = 1 if sides[0] > 2.0 * sides[1] else min(count, 3 if count not in (2, 4) else 2)
+    longest = min(LONGEST_SIDE, widest / columns) if columns > 1 else 1.6 * LONGEST_SIDE
+    width, height = longest * sides / sides.max()
+    return columns, width, height
+
+
+def _label_axes(panels, count: int) -> None:
+    """Numbers and names on the outer axes of the first `count` panels of a grid."""
+    columns = panels.shape[1]
+    for i, panel in enumerate(panels.flat[:count]):
+        is_lowest = i + columns >= count
+        panel.tick_params(labelbottom=is_lowest, labelleft=i % columns == 0)
+        if is_lowest:
+            panel.set_xlabel("$x$")
+        if i % columns == 0:
+            panel.set_ylabel("$y$")
+
+
+def _where(plane: Plane) -> str:
+    return "" if plane.height is None else f", at $z$ = {plane.height:.4g}"

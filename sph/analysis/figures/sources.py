@@ -1,0 +1,165 @@
+"""What is drawn: runs and checkpoints, and their state as the pictures ask for it."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+
+from sph.analysis import errors
+from sph.domain import Domain
+from sph.errors import FileError
+from sph.output import checkpoint
+from sph.output.run_directory import RunDirectory, find
+
+
+@dataclass(frozen=True)
+class Source:
+    """A run directory with its checkpoints, or one checkpoint (`run`: where it lies, if in one)."""
+
+    path: Path
+    run: RunDirectory | None
+    checkpoints: tuple[Path, ...]
+
+    @property
+    def is_run(self) -> bool:
+        return self.path.is_dir()
+
+    @property
+    def label(self) -> str:
+        """The run's name, with the checkpoint's where it is one."""
+        if self.run is None:
+            return self.path.stem
+        name = self.run.path.resolve().name
+        return name if self.is_run else f"{name}/{self.path.stem}"
+
+    def last(self) -> "State":
+        """The last state. Raises FileError."""
+        return State(checkpoint.read(self.checkpoints[-1]))
+
+    def over_time(self, most: int) -> Iterator["State"]:
+        """The first, the last and others evenly between them, at most `most`. Raises FileError.
+
+        They are read one by one, since a large run's do not fit into memory together.
+        """
+        count = len(self.checkpoints)
+        chosen = np.unique(np.linspace(0, count - 1, min(count, most)).round().astype(int))
+        for i in chosen:
+            yield State(checkpoint.read(self.checkpoints[i]))
+
+
+def find_source(path: Path) -> Source:
+    """The run or checkpoint at `path`. Raises FileError where there is nothing to draw."""
+    path = Path(path)
+    if path.is_dir():
+        run = RunDirectory.open(path)
+        found = tuple(run.checkpoints())
+        if not found:
+            raise FileError(f"{path} has no checkpoints, so there is nothing to draw.")
+        return Source(path, run, found)
+    run, path = find(path)
+    return Source(path, run, (path,))
+
+
+def labels(sources: Sequence[Source]) -> list[str]:
+    """A name for each; whole paths where the short names do not tell them apart."""
+    short = [source.label for source in sources]
+    return short if len(set(short)) == len(short) else [str(source.path) for source in sources]
+
+
+@dataclass(frozen=True)
+class State:
+    """A checkpoint as the pictures ask for it."""
+
+    checkpoint: checkpoint.Checkpoint
+
+    @property
+    def particles(self):
+        return self.checkpoint.particles
+
+    @property
+    def problem(self):
+        return self.checkpoint.config.problem
+
+    @property
+    def time(self) -> float:
+        return self.checkpoint.time
+
+    @property
+    def dimension(self) -> int:
+        return self.particles.dimension
+
+    @property
+    def kernel(self):
+        return self.checkpoint.config.physics.kernel_model()
+
+    @cached_property
+    def eos(self):
+        return self.checkpoint.config.physics.eos_model()
+
+    @cached_property
+    def domain(self) -> Domain:
+        return Domain(self.problem.box, self.problem.boundaries)
+
+    @property
+    def title(self) -> str:
+        """What it is, whenever."""
+        number = f"{self.particles.number:,}".replace(",", r"\,")
+        return f"{self.name}, {self.dimension}-D, $N = {number}$"
+
+    @property
+    def name(self) -> str:
+        return self.problem.name.replace("_", " ")
+
+    @property
+    def when(self) -> str:
+        return f"$t$ = {self.time:.4g}"
+
+    def scalar(self, name: str) -> np.ndarray:
+        """(N,) density, pressure, internal_energy, or speed |v|."""
+        if name == "speed":
+            return np.linalg.norm(self.particles.velocity, axis=0)
+        if name == "pressure":
+            return self.checkpoint.pressure
+        return getattr(self.particles, name)
+
+    def exact(self, position: np.ndarray) -> dict[str, np.ndarray] | None:
+        """The exact solution at (D, M) positions, or None."""
+        return self.problem.exact(self.eos, self.time, position)
+
+    @cached_property
+    def has_exact(self) -> bool:
+        return self.exact(self.particles.position[:, :1]) is not None
+
+    def errors(self) -> dict[str, float]:
+        """L1 by field over the problem's region; empty where there is no exact solution."""
+        found = errors.against_exact(
+            self.problem, self.eos, self.time, self.particles, self.checkpoint.pressure
+        )
+        return {name: norm["L1"] for name, norm in found["fields"].items()} if found else {}
+
+    @cached_property
+    def is_radial(self) -> bool:
+        """Whether the exact solution, at the run's end, is the same along all axes from the centre.
+
+        A uniform one is not: it has no centre.
+        """
+        if self.dimension == 1 or not self.has_exact:
+            return False
+        end = self.checkpoint.config.time.end
+        reach = (self.problem.box[:, 1] - self.problem.box[:, 0]).min() / 2
+        distance = np.linspace(0.01, 0.99, 50) * reach
+        along = [
+            self.problem.exact(self.eos, end, self._on_axis(axis, distance))["density"]
+            for axis in range(self.dimension)
+        ]
+        # the same formula at the same radius but for the round-off of adding the centre
+        alike = all(np.allclose(other, along[0], rtol=1e-6) for other in along)
+        return alike and np.ptp(along[0]) > 0.0
+
+    def _on_axis(self, axis: int, distance: np.ndarray) -> np.ndarray:
+        """(D, M) positions at `distance` (M,) from the box's centre along `axis`."""
+        position = np.repeat(self.problem.box.mean(axis=1)[:, None], distance.size, axis=1)
+        position[axis] += distance
+        return position

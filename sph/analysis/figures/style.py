@@ -1,0 +1,100 @@
+"""How pictures look: type, colours, symbols. Colours are told apart by the colour-blind too."""
+
+import math
+from contextlib import contextmanager
+
+import matplotlib
+import numpy as np
+from matplotlib.colors import LogNorm, Normalize
+from matplotlib.figure import Figure
+
+DPI = 180
+
+SYMBOLS = {
+    "density": r"$\rho$",
+    "velocity": r"$v$",
+    "pressure": r"$P$",
+    "internal_energy": r"$u$",
+    "speed": r"$|\mathbf{v}|$",
+}
+# Perceptually uniform, one a field, so that a reader does not take one for another.
+MAPS = {"density": "viridis", "pressure": "inferno", "speed": "cividis"}
+VACUUM = "0.85"
+MOST_DECADES = 4
+
+# Okabe & Ito (2008), the dark ones first.
+PALETTE = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
+EXACT = "black"
+
+SETTINGS = {
+    "font.family": "STIXGeneral",
+    "mathtext.fontset": "stix",
+    "font.size": 11,
+    "axes.labelsize": 12,
+    "axes.titlesize": 12,
+    "figure.titlesize": 13,
+    "legend.fontsize": 10,
+    "legend.frameon": False,
+    "legend.handlelength": 1.5,
+    "axes.linewidth": 0.8,
+    "xtick.direction": "in",
+    "ytick.direction": "in",
+    "xtick.top": True,
+    "ytick.right": True,
+    "lines.linewidth": 1.2,
+    "axes.formatter.limits": (-3, 4),
+    "axes.formatter.use_mathtext": True,
+    "figure.constrained_layout.h_pad": 0.07,
+    "pdf.fonttype": 42,  # letters stay letters, as journals ask
+    "svg.fonttype": "path",
+}
+
+
+@contextmanager
+def paper():
+    """The settings of all pictures, within the block."""
+    with matplotlib.rc_context(SETTINGS):
+        yield
+
+
+def new_figure(width: float, height: float, layout: str = "constrained") -> Figure:
+    """An empty figure of that size in inches, which belongs to no window."""
+    return Figure(figsize=(width, height), dpi=DPI, layout=layout)
+
+
+def colours(count: int) -> list:
+    """For things without an order."""
+    return list(PALETTE[:count]) if count <= len(PALETTE) else sequence(count)
+
+
+def sequence(count: int) -> list:
+    """For things in order, such as times, from dark to light."""
+    ramp = matplotlib.colormaps["viridis"]
+    return [ramp(0.9 * i / max(count - 1, 1)) for i in range(count)]
+
+
+def scale(values) -> Normalize:
+    """For a map: logarithmic where positive values span three decades, and at most MOST_DECADES."""
+    finite = values[np.isfinite(values)]
+    if finite.size == 0:
+        return Normalize(0.0, 1.0)
+    low, high = float(finite.min()), float(finite.max())
+    if low > 0.0 and high > 1000.0 * low:
+        return LogNorm(max(low, high / 10.0**MOST_DECADES), high)
+    if high - low <= 1e-6 * abs(high):  # uniform gas: do not magnify round-off
+        margin = 0.1 * abs(high) or 1.0
+        return Normalize(low - margin, high + margin)
+    return Normalize(low, high)
+
+
+def number(value: float) -> str:
+    """Three digits for a label, e.g. 0.00488 or 3.1 x 10^-5."""
+    if value == 0.0 or 1e-3 <= abs(value) < 1e4 or not math.isfinite(value):
+        return f"{value:.3g}"
+    mantissa, exponent = f"{value:.2e}".split("e")
+    return rf"${mantissa}\times10^{{{int(exponent)}}}$"
+
+
+def plain(text: str) -> str:
+    """A name shown as it is, where Matplotlib would read mathematics into it."""
+    return text.replace("$", r"\$")

@@ -1,0 +1,91 @@
+"""Norms of made-up differences whose norms are known by construction."""
+
+import numpy as np
+import pytest
+
+from sph import config
+from sph.analysis import errors
+from sph.particles import Particles
+
+ROUND_OFF = 1e-13  # sums of at most some hundred terms of order 1
+
+
+def test_constant_difference_has_that_norm_whatever_the_volumes():
+    volume = np.random.default_rng(1).random(100) + 0.1
+    found = errors.norms(np.full(100, -0.25), volume)
+    for name in ("L1", "L2", "Linf"):
+        assert found[name] == pytest.approx(0.25, rel=ROUND_OFF)
+
+
+def test_norms_weigh_by_volume():
+    # a difference of 2 in a quarter of the volume, none elsewhere
+    found = errors.norms(np.array([2.0, 0.0]), np.array([1.0, 3.0]))
+    assert found["L1"] == pytest.approx(0.5, rel=ROUND_OFF)
+    assert found["L2"] == pytest.approx(1.0, rel=ROUND_OFF)
+    assert found["Linf"] == 2.0
+
+
+def test_norms_of_a_vector_take_its_length():
+    difference = np.array([[3.0, 0.0], [-4.0, 0.0]])
+    found = errors.norms(difference, np.array([1.0, 1.0]))
+    assert found == pytest.approx({"L1": 2.5, "L2": np.sqrt(12.5), "Linf": 5.0}, rel=ROUND_OFF)
+
+
+@pytest.fixture
+def tube():
+    """A shock tube, and particles in its exact state at t = 0.1."""
+    made = config.from_text(
+        '[problem]\nname = "shock_tube"\ndimension = 2\nerror_range = [-0.2, 0.3]\n'
+    )
+    eos, problem = made.physics.eos_model(), made.problem
+    random = np.random.default_rng(2)
+    low, high = problem.box[:, :1], problem.box[:, 1:]
+    position = low + (high - low) * random.random((2, 200))
+    exact = problem.exact(eos, 0.1, position)
+    particles = Particles.at_start(
+        position, exact["velocity"], np.full(200, 0.01), exact["internal_energy"]
+    )
+    particles.density[:] = exact["density"]
+    return problem, eos, particles, exact["pressure"].copy()
+
+
+def test_the_exact_state_has_no_error(tube):
+    problem, eos, particles, pressure = tube
+    found = errors.against_exact(problem, eos, 0.1, particles, pressure)
+    assert set(found["fields"]) == set(errors.FIELDS)
+    assert all(norm["Linf"] == 0.0 for norm in found["fields"].values())
+
+
+def test_a_shift_of_each_field_is_its_error(tube):
+    problem, eos, particles, pressure = tube
+    particles.velocity += np.array([[0.03], [0.04]])
+    particles.internal_energy -= 0.01
+    found = errors.against_exact(problem, eos, 0.1, particles, pressure + 0.02)["fields"]
+    assert found["velocity"]["L1"] == pytest.approx(0.05, rel=ROUND_OFF)
+    assert found["internal_energy"]["L2"] == pytest.approx(0.01, rel=ROUND_OFF)
+    assert found["pressure"]["Linf"] == pytest.approx(0.02, rel=ROUND_OFF)
+    assert found["density"]["Linf"] == 0.0
+
+
+def test_only_the_error_region_counts(tube):
+    problem, eos, particles, pressure = tube
+    x = particles.position[0]
+    inside = (x > -0.2) & (x < 0.3)
+    found = errors.against_exact(
+        problem, eos, 0.1, particles, pressure + np.where(inside, 0.0, 9.0)
+    )
+    assert found["fields"]["pressure"]["Linf"] == 0.0
+    assert found["particles"] == inside.sum()
+    assert found["region"] == "-0.2 < x < 0.3"
+
+
+def test_no_error_without_particles_in_the_region(tube):
+    problem, eos, particles, pressure = tube
+    particles.position[0] = 0.4
+    assert errors.against_exact(problem, eos, 0.1, particles, pressure) is None
+
+
+def test_no_error_without_an_exact_solution(tube):
+    _, eos, particles, pressure = tube
+    problem = config.from_text('[problem]\nname = "kelvin_helmholtz"\n').problem
+    assert errors.against_exact(problem, eos, 0.1, particles, pressure) is None

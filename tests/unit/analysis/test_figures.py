@@ -1,0 +1,371 @@
+"""Pictures: which are drawn, where they go, and that their axes hold the data they should."""
+
+import numpy as np
+import pytest
+from matplotlib.image import imread
+
+from sph import config, kernels, registry
+from sph.analysis import errors, figures
+from sph.analysis.figures import history, maps, profiles, style
+from sph.analysis.figures.sources import State, find_source
+from sph.analysis.interpolate import onto_plane
+from sph.errors import ConfigError, FileError
+from sph.output import checkpoint
+from sph.output.history import History
+from sph.output.history import read as read_history
+from sph.output.run_directory import RunDirectory
+from sph.particles import Particles
+
+SMALL = {"shock_tube": 60, "point_explosion": 512}
+SETS = {
+    1: {"profiles", "evolution", "history"},
+    2: {"map", "evolution", "history"},
+    3: {"profiles", "slice", "evolution", "history"},
+}
+
+
+@pytest.fixture(autouse=True)
+def coarse(monkeypatch):
+    monkeypatch.setattr(style, "DPI", 40)
+    monkeypatch.setattr(maps, "PIXELS", 48)
+    monkeypatch.setattr(maps, "PIXELS_OF_MANY", 32)
+
+
+def state_of(problem: str, *overrides: str, time: float | None = None) -> State:
+    """The initial particles of a problem, on which an exact solution is laid where there is one."""
+    made = config.from_text(f'[problem]\nname = "{problem}"\nn = {SMALL.get(problem, 400)}\n')
+    made = made.override(overrides)
+    time = made.time.end if time is None else time
+    eos = made.physics.eos_model()
+    start = made.problem.initial(eos)
+    particles = Particles.at_start(*start)
+    volume = np.prod(made.problem.box[:, 1] - made.problem.box[:, 0])
+    wave = 1.0 + 0.3 * np.cos(2.0 * np.pi * particles.position[-1])
+    particles.density[:] = particles.mass.sum() / volume * wave
+    exact = made.problem.exact(eos, time, particles.position)
+    if exact is not None:
+        # a floor for the hollow middle of a blast
+        particles.density[:] = np.maximum(exact["density"], 0.01)
+        particles.velocity[:] = exact["velocity"]
+        particles.internal_energy[:] = np.minimum(exact["internal_energy"], 1e3)
+    D = made.problem.dimension
+    ratio = kernels.support_ratio(made.physics.kernel_model(), D)
+    particles.support[:] = (
+        ratio * made.physics.eta * (particles.mass / particles.density) ** (1 / D)
+    )
+    lists = {
+        "list_position": particles.position.copy(),
+        "list_support": particles.support.copy(),
+        "list_skin": 0.1,
+    }
+    return State(
+        checkpoint.Checkpoint(
+            particles, time, step=3, next_step=0.1, **lists, config=made, lineage=()
+        )
+    )
+
+
+def write_run(path, states) -> RunDirectory:
+    """A run directory with those states as checkpoints and a history of as many steps."""
+    run = RunDirectory.create(path)
+    made = states[0].checkpoint.config
+    run.write_config(made.to_toml())
+    diagnostics = [made.problem.diagnostics(state.particles) for state in states]
+    steps = History.create(run.history, made.problem.dimension, list(diagnostics[0]))
+    for step, state in enumerate(states):
+        row = dict.fromkeys(steps.columns, 1.0 + step) | diagnostics[step]
+        steps.append(row | {"step": step, "t": state.time, "limiter": "signal_speed"})
+        checkpoint.write(run.checkpoint_path(step), state.checkpoint)
+    steps.close()
+    return run
+
+
+@pytest.fixture
+def tube(tmp_path):
+    return write_run(tmp_path / "tube", [state_of("shock_tube", time=t) for t in (0.0, 0.1, 0.2)])
+
+
+@pytest.fixture
+def shear(tmp_path):
+    return write_run(tmp_path / "shear", [state_of("kelvin_helmholtz", time=t) for t in (0.0, 0.5)])
+
+
+def lines(panel) -> list[np.ndarray]:
+    """(2, M) of each line, in the order drawn."""
+    return [np.array(line.get_data()) for line in panel.get_lines()]
+
+
+# --- sets of pictures -------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("problem", registry.names("sph.problems"))
+def test_the_run_of_every_problem_draws(tmp_path, problem):
+    states = [state_of(problem, time=0.0), state_of(problem)]
+    run = write_run(tmp_path / "run", states)
+    drawn = figures.draw([run.path])
+    expected = SETS[states[0].dimension] | ({"profiles"} if states[0].has_exact else set())
+    assert {path.stem for path in drawn} == expected
+    for path in drawn:
+        assert path.parent == run.figures
+        picture = imread(path)[..., :3]
+        # about 7 inches at 40 dpi; the white of the paper is not all there is on it
+        assert min(picture.shape[:2]) > 80
+        assert 0.01 < (picture.min(axis=2) < 0.7).mean() < 0.99
+
+
+def test_each_of_several_runs_gets_its_own_set(tube, shear):
+    drawn = figures.draw([tube.path, shear.path])
+    assert {path.parent for path in drawn} == {tube.figures, shear.figures}
+
+
+def test_a_checkpoint_gets_its_own_picture_only(tube):
+    assert figures.draw([tube.checkpoint_path(1)]) == [tube.figures / "checkpoint_000001.png"]
+    assert len(list(tube.figures.iterdir())) == 1
+
+
+def test_a_lone_checkpoint_is_drawn_beside_it(tmp_path):
+    path = tmp_path / "mine.h5"
+    checkpoint.write(path, state_of("shock_tube").checkpoint)
+    assert figures.draw([path]) == [tmp_path / "mine.png"]
+
+
+@pytest.mark.parametrize(
+    ("suffix", "beginning"), [("png", b"\x89PNG"), ("pdf", b"%PDF"), ("svg", b"<?xml")]
+)
+def test_the_suffix_says_the_format(tube, tmp_path, suffix, beginning):
+    target = tmp_path / f"picture.{suffix}"
+    assert figures.draw([tube.path], target) == [target]
+    assert target.read_bytes().startswith(beginning)
+    assert not tube.figures.exists()
+
+
+def test_several_sources_make_one_picture(tube, shear, tmp_path):
+    for sources in ([tube.path, tube.checkpoint_path(1)], [shear.path, shear.checkpoint_path(0)]):
+        assert figures.draw(sources, tmp_path / "both.png") == [tmp_path / "both.png"]
+
+
+def test_a_run_is_shown_from_its_first_to_its_last_time(tube):
+    source = find_source(tube.path)
+    assert [state.time for state in source.over_time(6)] == [0.0, 0.1, 0.2]
+    assert [state.time for state in source.over_time(2)] == [0.0, 0.2]
+    assert source.last().time == 0.2
+
+
+# --- errors -----------------------------------------------------------------------------------
+
+
+def test_a_missing_run(tmp_path):
+    with pytest.raises(FileError, match="does not exist"):
+        figures.draw([tmp_path / "none"])
+
+
+def test_a_directory_that_is_no_run(tmp_path):
+    with pytest.raises(FileError, match="is not a run directory"):
+        figures.draw([tmp_path])
+
+
+def test_a_run_without_checkpoints(tmp_path):
+    run = RunDirectory.create(tmp_path / "run")
+    with pytest.raises(FileError, match="has no checkpoints"):
+        figures.draw([run.path])
+
+
+def test_an_unknown_suffix_is_refused_before_anything_is_read(tmp_path):
+    for name in ("picture.gif", "picture"):
+        with pytest.raises(ConfigError, match=r"\.png, \.pdf or \.svg"):
+            figures.draw([tmp_path / "none"], tmp_path / name)
+
+
+def test_a_target_that_cannot_be_written(tube, tmp_path):
+    with pytest.raises(FileError, match="cannot write"):
+        figures.draw([tube.path], tmp_path / "nowhere" / "picture.png")
+
+
+def test_a_figures_directory_that_cannot_be_made(tube):
+    tube.figures.write_text("a file in its place")
+    with pytest.raises(FileError, match="cannot write"):
+        figures.draw([tube.path])
+
+
+def test_what_one_picture_cannot_compare(tube, shear, tmp_path):
+    with pytest.raises(ConfigError, match="maps with profiles along x"):
+        figures.draw([tube.path, shear.path], tmp_path / "both.png")
+
+
+# --- profiles ---------------------------------------------------------------------------------
+
+
+def test_profiles_hold_particles_exact_solution_and_error():
+    state = state_of("shock_tube")
+    state.particles.density[:] += 0.05
+    picture = profiles.single(state)
+    particles, exact = lines(picture.axes[0])
+    np.testing.assert_array_equal(particles, [state.particles.position[0], state.particles.density])
+    at = exact[0]
+    np.testing.assert_array_equal(exact[1], state.exact(at[None])["density"])
+    assert at[0] == state.particles.position[0].min()
+    assert at[-1] == state.particles.position[0].max()
+    norm = errors.against_exact(
+        state.problem, state.eos, state.time, state.particles, state.checkpoint.pressure
+    )["fields"]["density"]["L1"]
+    assert norm == pytest.approx(0.05)
+    assert "0.05" in picture.axes[0].get_legend().get_texts()[0].get_text()
+    assert "0.2" in picture.get_suptitle()
+
+
+def test_panels_are_the_four_fields():
+    state = state_of("shock_tube")
+    shown = [lines(panel)[0][1] for panel in profiles.single(state).axes]
+    p = state.particles
+    expected = [p.density, p.velocity[0], state.checkpoint.pressure, p.internal_energy]
+    for values, right in zip(shown, expected, strict=True):
+        np.testing.assert_array_equal(values, right)
+
+
+def test_profiles_keep_to_the_error_region():
+    state = state_of("shock_tube", "problem.error_range=[-0.1, 0.3]")
+    particles, exact = lines(profiles.single(state).axes[0])
+    x = state.particles.position[0]
+    assert particles.shape[1] == np.sum((x > -0.1) & (x < 0.3))
+    assert exact[0].min() > -0.1
+    assert exact[0].max() < 0.3
+
+
+def test_a_blast_is_shown_over_its_radius():
+    state = state_of("point_explosion")
+    offset = state.particles.position - state.problem.box.mean(axis=1)[:, None]
+    state.particles.velocity[:] = 3.0 * offset
+    found = profiles.profile(state)
+    assert found.symbol == "r"
+    # v_r = 3 r exactly but for the round-off of a scalar product
+    np.testing.assert_allclose(found.fields["velocity"], 3.0 * found.coordinate, rtol=1e-13)
+    inside, _ = state.problem.error_region(state.time, state.particles.position)
+    assert found.coordinate.size == inside.sum()
+
+
+@pytest.mark.parametrize("time", [0.0, 0.05])
+def test_only_a_blast_is_radial(time):
+    assert state_of("point_explosion", time=time).is_radial
+    assert state_of("point_explosion", "problem.dimension=2", time=time).is_radial
+    assert not state_of("point_explosion", "problem.dimension=1", time=time).is_radial
+    assert not state_of("shock_tube", "problem.dimension=2", time=time).is_radial
+    assert not state_of("uniform", time=time).is_radial
+    assert not state_of("kelvin_helmholtz", time=time).is_radial
+
+
+def test_bins_hold_their_percentiles():
+    # 10 x 101 particles; at each coordinate the values 0 ... 100, whose percentiles are themselves
+    coordinate = np.repeat(np.arange(10.0), 101)
+    values = np.tile(np.arange(101.0), 10)
+    middle, percentiles = profiles.binned(coordinate, values)
+    np.testing.assert_allclose(middle, np.arange(10.0), rtol=1e-15)
+    np.testing.assert_allclose(percentiles, np.tile([[5.0], [50.0], [95.0]], 10), rtol=1e-15)
+
+
+def test_compared_profiles_lie_over_each_other_with_a_label_each():
+    states = [state_of("shock_tube", f"problem.n={n}") for n in (60, 90)]
+    picture = profiles.compared(states, ["few", "many"])
+    drawn = lines(picture.axes[2])[:2]
+    for state, values in zip(states, drawn, strict=True):
+        np.testing.assert_array_equal(values[1], state.checkpoint.pressure)
+    assert [text.get_text() for text in picture.legends[0].get_texts()] == ["few", "many", "exact"]
+
+
+def test_a_peak_makes_its_axis_logarithmic_and_nothing_else_does():
+    blast = profiles.single(state_of("point_explosion")).axes
+    assert [panel.get_yscale() for panel in blast] == ["linear", "linear", "linear", "log"]
+    tube = profiles.single(state_of("shock_tube")).axes
+    assert {panel.get_yscale() for panel in tube} == {"linear"}
+
+
+# --- maps -------------------------------------------------------------------------------------
+
+
+def test_a_map_holds_the_interpolated_fields():
+    state = state_of("kelvin_helmholtz")
+    plane = maps.plane_of(state, 48)
+    speed = np.linalg.norm(state.particles.velocity, axis=0)
+    values = np.stack([state.particles.density, speed])
+    expected = onto_plane(values, state.particles, state.domain, state.kernel, plane)
+    shown = [panel.images[0] for panel in maps.single(state).axes if panel.images]
+    for image, values in zip(shown, expected, strict=True):
+        np.testing.assert_array_equal(np.ma.getdata(image.get_array()), values)
+        assert image.get_extent() == [-0.5, 0.5, -0.5, 0.5]
+        assert image.axes.get_aspect() == 1.0
+
+
+def test_pressure_is_mapped_where_it_varies():
+    assert maps.second_field(state_of("point_explosion")) == "pressure"
+    assert maps.second_field(state_of("kelvin_helmholtz")) == "speed"
+
+
+def test_maps_over_time_share_their_colours():
+    states = [state_of("kelvin_helmholtz", time=t) for t in (0.0, 0.1, 0.2)]
+    states[1].particles.density[:] *= 2.0
+    images = [panel.images[0] for panel in maps.over_time(states).axes if panel.images]
+    assert len(images) == 3
+    limits = {(image.norm.vmin, image.norm.vmax) for image in images}
+    assert limits == {
+        (min(image.get_array().min() for image in images),
+         max(image.get_array().max() for image in images))
+    }  # fmt: skip
+
+
+def test_a_slice_goes_through_the_middle():
+    state = state_of("point_explosion", "problem.domain=[[0, 1], [0, 1], [0, 3]]")
+    assert maps.plane_of(state, 16).height == 1.5
+    assert "$z$ = 1.5" in maps.single(state).get_suptitle()
+
+
+def test_gas_that_left_an_open_domain_is_on_the_map():
+    state = state_of("uniform", 'problem.boundary=["open", "periodic"]')
+    state.particles.position[0] += 0.5
+    plane = maps.plane_of(state, 16)
+    assert plane.low[0] == 0.0
+    assert plane.high[0] > 1.4
+
+
+# --- history ----------------------------------------------------------------------------------
+
+
+def test_history_shows_drift_limiter_and_diagnostics(shear):
+    found = read_history(shear.history)
+    found["mode_amplitude"] = np.array([0.1, 0.3])
+    found["total_energy"] = np.array([2.0, 2.5])
+    found["limiter"] = np.array(["signal_speed", "energy"], dtype=object)
+    energies, drift, momentum, steps, mode = history.figure(found, "a run").axes
+    assert len(energies.get_lines()) == 3
+    np.testing.assert_array_equal(lines(drift)[0], [found["t"], [0.0, 0.25]])
+    assert [line[1].tolist() for line in lines(momentum)] == [[0.0, 1.0]] * 2
+    assert [text.get_text() for text in steps.get_legend().get_texts()] == [
+        "signal speed",
+        "energy",
+    ]
+    assert [line[0].tolist() for line in lines(steps)] == [[0.0], [0.5]]
+    assert mode.get_yscale() == "log"
+    np.testing.assert_array_equal(lines(mode)[0][1], found["mode_amplitude"])
+
+
+# --- style ------------------------------------------------------------------------------------
+
+
+def test_scales():
+    assert style.scale(np.array([1.0, np.nan, 3.0])).vmax == 3.0
+    wide = style.scale(np.array([1e-9, 1.0]))
+    assert wide.vmin == pytest.approx(10.0**-style.MOST_DECADES)
+    # round-off of uniform gas is not blown up to the whole range of colours
+    uniform = style.scale(np.array([1.0, 1.0 + 1e-12]))
+    assert uniform.vmax - uniform.vmin > 0.1
+
+
+@pytest.mark.parametrize(
+    ("value", "text"),
+    [
+        (0.004876, "0.00488"),
+        (0.0, "0"),
+        (3.1234e-5, r"$3.12\times10^{-5}$"),
+        (2e4, r"$2.00\times10^{4}$"),
+    ],
+)
+def test_numbers(value, text):
+    assert style.number(value) == text
