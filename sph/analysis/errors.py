@@ -27,7 +27,7 @@ def against_exact(problem, eos, time: float, particles, pressure) -> dict | None
     exact = problem.exact(eos, time, particles.position)
     if exact is None:
         return None
-    inside, words = problem.error_region(time, particles.position)
+    inside, words = problem.error_region(eos, time, particles.position)
     if not inside.any():
         return None
     state = {

@@ -72,7 +72,7 @@ class Problem(Section):
         """Exact density, velocity (D, N), pressure and internal_energy at (D, N) positions, or None."""
         return None
 
-    def error_region(self, time: float, position: np.ndarray) -> tuple[np.ndarray, str]:
+    def error_region(self, eos, time: float, position: np.ndarray) -> tuple[np.ndarray, str]:
         """(N,) mask of the particles over which errors are taken, and that region in words."""
         return np.ones(position.shape[1], dtype=bool), "the whole domain"
 

@@ -161,9 +161,9 @@ class Problem(base.Problem):
             "internal_energy": eos.internal_energy(in_gas, pressure),
         }
 
-    def error_region(self, time: float, position: np.ndarray) -> tuple[np.ndarray, str]:
+    def error_region(self, eos, time: float, position: np.ndarray) -> tuple[np.ndarray, str]:
         if self.error_range is None:
-            return super().error_region(time, position)
+            return super().error_region(eos, time, position)
         low, high = self.error_range
         return (low < position[0]) & (position[0] < high), f"{low:g} < x < {high:g}"
 
@@ -172,7 +172,7 @@ class Problem(base.Problem):
 
         The outer fifth of a plateau, a tenth at either end, is left out: waves are smeared there.
         """
-        region, _ = self.error_region(time, particles.position)
+        region, _ = self.error_region(eos, time, particles.position)
         star = riemann.star_state(*self._states(), eos.gamma)
         speed = riemann.wave_speeds(*self._states(), eos.gamma)
         highest = max(self.left.density, self.right.density, star.density_left, star.density_right)

@@ -219,10 +219,10 @@ def test_vacuum_between_parting_gases_has_no_internal_energy():
 
 def test_errors_are_taken_within_the_range_that_is_given():
     problem = ShockTube(domain=[-1.0, 1.0], error_range=[-0.45, 0.4])
-    mask, words = problem.error_region(0.1, np.array([[-0.5, -0.45, -0.4, 0.39, 0.4]]))
+    mask, words = problem.error_region(AIR, 0.1, np.array([[-0.5, -0.45, -0.4, 0.39, 0.4]]))
     assert mask.tolist() == [False, False, True, True, False]
     assert words == "-0.45 < x < 0.4"
-    assert ShockTube().error_region(0.1, np.array([[-0.5]]))[0].all()
+    assert ShockTube().error_region(AIR, 0.1, np.array([[-0.5]]))[0].all()
 
 
 def test_report_of_the_exact_profile_finds_no_error_and_sees_one():
@@ -308,12 +308,12 @@ def test_exact_explosion_points_outward_and_is_that_of_sedov():
 def test_error_region_follows_the_shock_up_to_the_faces():
     problem = PointExplosion()
     position = np.array([[0.416, 0.418, 0.499], [0.0] * 3, [0.0] * 3])
-    mask, words = problem.error_region(0.05, position)
+    mask, words = problem.error_region(MONATOMIC, 0.05, position)
     # 1.2 x 1.152 t^0.4 = 0.417
     assert mask.tolist() == [True, False, False]
     assert words == "r < 0.417 around the centre"
-    assert "0.5" in problem.error_region(1.0, position)[1]
-    assert problem.error_region(0.0, position)[0].all()
+    assert "0.5" in problem.error_region(MONATOMIC, 1.0, position)[1]
+    assert problem.error_region(MONATOMIC, 0.0, position)[0].all()
 
 
 def test_momentum_weighted_radius_of_the_exact_profile_is_exact():

@@ -30,7 +30,7 @@ class Profile(NamedTuple):
 def profile(state: State) -> Profile:
     """The particles of the problem's error region, and the exact solution there."""
     particles, problem = state.particles, state.problem
-    inside, _ = problem.error_region(state.time, particles.position)
+    inside, _ = problem.error_region(state.eos, state.time, particles.position)
     if not inside.any():
         inside[:] = True
     centre = problem.box.mean(axis=1)

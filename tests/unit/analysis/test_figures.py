@@ -239,7 +239,7 @@ def test_a_blast_is_shown_over_its_radius():
     assert found.symbol == "r"
     # v_r = 3 r exactly but for the round-off of a scalar product
     np.testing.assert_allclose(found.fields["velocity"], 3.0 * found.coordinate, rtol=1e-13)
-    inside, _ = state.problem.error_region(state.time, state.particles.position)
+    inside, _ = state.problem.error_region(state.eos, state.time, state.particles.position)
     assert found.coordinate.size == inside.sum()
 
 
