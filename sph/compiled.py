@@ -20,7 +20,7 @@ COMPILED = {"cache": True, "nogil": True, **FLAGS}
 
 
 def verb(stub):
-    """Make `stub(model, ...)` resolve at compile time to the method of that name of the model's class.
+    """Make `stub(model, ...)` resolve at compile time to that method of the model's class.
 
     A model (kernel, equation of state, viscosity) is a NamedTuple whose methods are its formulas:
     called from Python they work on NumPy arrays, called from compiled code they are inlined.
@@ -30,7 +30,8 @@ def verb(stub):
     parameters = list(inspect.signature(stub).parameters)
 
     def pick(self, *_):
-        return getattr(self.instance_class, name) if isinstance(self, types.BaseNamedTuple) else None
+        is_model = isinstance(self, types.BaseNamedTuple)
+        return getattr(self.instance_class, name) if is_model else None
 
     # Numba compares the names of the parameters, so the function it gets must have the stub's own.
     source = f"lambda {', '.join(parameters)}: pick({', '.join(parameters)})"

@@ -23,7 +23,7 @@ class Images(NamedTuple):
 
 @dataclass(frozen=True)
 class Domain:
-    """`box` (D, 2): lower and upper end of each axis; `boundaries`: "periodic", "mirror" or "open"."""
+    """`box` (D, 2): lower and upper end of each axis; `boundaries`: one name for each of them."""
 
     box: np.ndarray
     boundaries: tuple[str, ...]

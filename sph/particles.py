@@ -62,4 +62,5 @@ class Particles:
     def by_id(self) -> "Particles":
         """A copy ordered by ID, to compare two runs or to plot."""
         order = np.argsort(self.id, kind="stable")
-        return Particles(**{k: np.ascontiguousarray(a[..., order]) for k, a in self.arrays().items()})
+        arrays = self.arrays().items()
+        return Particles(**{name: np.ascontiguousarray(a[..., order]) for name, a in arrays})

@@ -3,11 +3,11 @@
 from dataclasses import dataclass
 from functools import cached_property
 
-from sph import kernels
+from sph import kernels, schemes
 from sph.config import Config
 from sph.domain import Domain
-from sph.schemes import grad_h
-from sph.schemes.smoothing import Converged, FixedPasses
+from sph.passes import Models
+from sph.passes.smoothing import Converged, FixedPasses
 from sph.viscosity import balsara
 
 # Relative tolerance of the converged support: round-off of the density sum is some 1e-14.
@@ -49,20 +49,21 @@ class Scene:
         return self.config.physics.balsara or self.evolves_alpha
 
     @cached_property
-    def models(self) -> grad_h.Models:
+    def models(self) -> Models:
         """The models of the density and rate passes."""
         passes = self.config.physics.density_passes
         return self._models(Converged(TOLERANCE) if passes == "converged" else FixedPasses(passes))
 
     @cached_property
-    def starting_models(self) -> grad_h.Models:
+    def starting_models(self) -> Models:
         """The same, but with converged supports: what a run begins with."""
         return self._models(Converged(TOLERANCE))
 
-    def _models(self, smoothing) -> grad_h.Models:
+    def _models(self, smoothing) -> Models:
         physics = self.config.physics
         kernel = physics.kernel_model()
-        return grad_h.Models(
+        return Models(
+            scheme=schemes.make(physics.scheme),
             kernel=kernel,
             smoothing=smoothing,
             eos=self.eos,
@@ -96,7 +97,7 @@ class Scene:
 
         part(self.evolves_alpha, "equation for alpha", "alpha is one number")
         part(physics.balsara, "Balsara factor", "physics.balsara = false")
-        part(self.needs_divergence, "divergence of velocity", "neither Balsara nor alpha asks for it")
+        part(self.needs_divergence, "divergence of velocity", "neither Balsara nor alpha needs it")
         part(
             self.needs_curl,
             "curl of velocity",

@@ -6,6 +6,7 @@ import numpy as np
 from numba import njit
 from numba.core.registry import cpu_target
 
+from sph import passes
 from sph.clock import Clock
 from sph.compiled import COMPILED
 from sph.errors import NumericalError
@@ -13,8 +14,8 @@ from sph.integrators import leapfrog, step_size
 from sph.neighbours.order import BLOCK, number_of_blocks
 from sph.neighbours.search import Origin, Search, first_guess
 from sph.particles import Particles
+from sph.passes import density, rates
 from sph.scene import Scene
-from sph.schemes import grad_h
 from sph.threads import Team
 
 # Each widening lists to at least the radius that was asked for, which grows by 2 at the most.
@@ -97,7 +98,7 @@ class Simulation:
 
     @classmethod
     def start(cls, scene: Scene, threads: int, clock: Clock) -> "Simulation":
-        """From the problem's initial state: converged supports, rates, and the first step's size."""
+        """From the problem's initial state: converged supports, rates, and the first step."""
         with clock.phase("start of Numba"):
             # its tables are filled on first use; here, so that no phase of a step pays for it
             cpu_target.target_context.refresh()
@@ -192,19 +193,19 @@ class Simulation:
             skin = self.search.skin_for(self._velocity, p.support, dt)
             self.search.build(Origin(p.position.copy(), p.support.copy(), skin), p.id)
 
-    def _neighbours(self) -> grad_h.Neighbours:
+    def _neighbours(self) -> passes.Neighbours:
         search = self.search
-        return grad_h.Neighbours(
+        return passes.Neighbours(
             search.lists, search.domain.images, search.origin.support, search.reach_factor
         )
 
-    def _gas(self) -> grad_h.Gas:
+    def _gas(self) -> passes.Gas:
         p = self.particles
-        return grad_h.Gas(p.position, self._velocity, p.mass, self._energy, p.support)
+        return passes.Gas(p.position, self._velocity, p.mass, self._energy, p.support)
 
-    def _fields(self, support) -> grad_h.Fields:
+    def _fields(self, support) -> passes.Fields:
         p = self.particles
-        return grad_h.Fields(support, p.density, p.omega, self._pressure_term, self._sound_speed)
+        return passes.Fields(support, p.density, p.omega, self._pressure_term, self._sound_speed)
 
     def _density(self, models) -> None:
         """Steps 2-4 and 6: density, support, Omega, div and curl, EOS, Balsara, alpha's rate."""
@@ -212,7 +213,7 @@ class Simulation:
         for _ in range(MAX_WIDENINGS):
             with self.clock.phase("density"):
                 self.team.run(
-                    grad_h.density, self._wanted.size, self._dim, models, self._neighbours(),
+                    density.density, self._wanted.size, self._dim, models, self._neighbours(),
                     self._gas(), self._alpha, self._fields(self._support), self._div_v,
                     self._curl_v, self._balsara, p.alpha_rate, self._wanted,
                 )  # fmt: skip
@@ -234,7 +235,7 @@ class Simulation:
         p = self.particles
         with self.clock.phase("rates"):
             self.team.run(
-                grad_h.rates, self._wanted.size, self._dim, models, self._neighbours(),
+                rates.rates, self._wanted.size, self._dim, models, self._neighbours(),
                 self._gas(), self._alpha, self._fields(p.support), self._balsara, p.acceleration,
                 p.energy_rate, self._signal_speed,
             )  # fmt: skip
@@ -254,7 +255,7 @@ class Simulation:
         return Totals(*_totals(p.mass, p.velocity, p.internal_energy, p.density))
 
     def _check(self) -> None:
-        """Raise NumericalError where a number is not finite, or a density or energy not positive."""
+        """Raise NumericalError where a number is not finite, a density or energy not positive."""
         t = self.totals
         sound = np.isfinite(t.energy) and np.isfinite(t.max_density) and np.isfinite(self.limit.dt)
         if sound and t.min_density > 0 and t.min_internal_energy >= 0 and self.limit.dt > 0:

@@ -4,6 +4,7 @@ Compiled passes release the interpreter's lock, so plain Python threads run them
 Every particle is written by the one range that holds it, so the split does not show in the result.
 """
 
+import itertools
 from concurrent.futures import ThreadPoolExecutor
 
 # Blocks below which a range is not worth handing to another thread: handing over costs some 50
@@ -31,7 +32,7 @@ class Team:
         edges = [items * k // ranges for k in range(ranges + 1)]
         calls = [
             self._pool.submit(function, first, last, *arguments)
-            for first, last in zip(edges[:-1], edges[1:], strict=True)
+            for first, last in itertools.pairwise(edges)
         ]
         for call in calls:
             call.result()

@@ -23,7 +23,7 @@ def predict(dt, position, velocity, acceleration, velocity_full):
 
 @njit(**COMPILED)
 def predict_scalar(dt, value, rate, value_full):
-    """Half a step in place, the full step into value_full: eqs 3 and 5, or 6 and 31's first half."""
+    """Half a step in place, the full step into value_full: eqs 3, 5, 6 and the first of 31."""
     for i in range(value.size):
         start = value[i]
         value_full[i] = start + rate[i] * dt

@@ -37,7 +37,7 @@ def force_over_q(self, dim, q):
 
 
 def support_ratio(kernel, dimension: int) -> float:
-    """H/h = 1/(2 sigma), sigma the kernel's standard deviation per axis (Dehnen & Aly 2012, eq 8)."""
+    """H/h = 1/(2 sigma), sigma the kernel's standard deviation per axis (Dehnen & Aly 2012)."""
     dim = (0,) * dimension
     # 40 nodes on either side of q = 1/2 integrate any piecewise polynomial used here exactly.
     node, weight = np.polynomial.legendre.leggauss(40)

@@ -1,1 +1,1 @@
-"""Neighbours: order the particles into blocks, box the blocks into a tree, list candidates a block."""
+"""Neighbours: particles in blocks, a tree of their boxes, and each block's list of candidates."""

@@ -44,7 +44,9 @@ class Problem(Section):
 
     name: str = Field(description="which problem: `sph list` names them")
     dimension: int = Field(ge=1, le=3, description="number of space dimensions")
-    n: int = Field(ge=2, le=100_000_000, description="particles in all; the lattice takes the nearest it can")
+    n: int = Field(
+        ge=2, le=100_000_000, description="particles in all; the lattice takes the nearest it can"
+    )
     domain: list[float] | list[list[float]] = Field(
         description="[lo, hi] for every axis alike, or one [lo, hi] per axis"
     )
@@ -69,7 +71,7 @@ class Problem(Section):
         raise NotImplementedError
 
     def exact(self, eos, time: float, position: np.ndarray) -> dict[str, np.ndarray] | None:
-        """Exact density, velocity (D, N), pressure and internal_energy at (D, N) positions, or None."""
+        """Exact density, velocity (D, N), pressure, internal_energy at (D, N) points, or None."""
         return None
 
     def error_region(self, eos, time: float, position: np.ndarray) -> tuple[np.ndarray, str]:
@@ -81,5 +83,5 @@ class Problem(Section):
         return {}
 
     def report(self, eos, time: float, particles, pressure) -> dict[str, float]:
-        """Further figures of the summary at the end of a run, e.g. a shock's radius against exact."""
+        """Further figures of the summary at the end of a run, e.g. a shock's radius."""
         return {}

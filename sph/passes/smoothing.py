@@ -35,12 +35,14 @@ class FixedPasses(NamedTuple):
                 return H, rho, Omega, H
             H_inv = 1.0 / H
             sum_w = 0.0
-            for k in range(nc):
-                sum_w += m[k] * w(kernel, dim, r[k] * H_inv)
-            if index == self.count - 1:
+            if index < self.count - 1:
+                for k in range(nc):
+                    sum_w += m[k] * w(kernel, dim, r[k] * H_inv)
+            else:
                 sum_dw = 0.0
                 for k in range(nc):
                     q = r[k] * H_inv
+                    sum_w += m[k] * w(kernel, dim, q)
                     sum_dw += m[k] * (q * q) * dw_over_q(kernel, dim, q)
                 Omega = -sum_dw / (D * sum_w)  # eq 8 with eqs 7 and 10: the D w terms cancel the 1
             rho = C * H_inv**D * sum_w  # eq 7

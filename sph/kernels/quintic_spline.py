@@ -1,0 +1,37 @@
+"""Quintic B-spline kernel (Schoenberg 1946; Morris 1996).
+
+It pays in smooth flow at eta up to about 1.5 in 3-D, beyond which particles pair.
+"""
+
+import math
+from typing import NamedTuple
+
+from sph.compiled import larger
+
+
+class Model(NamedTuple):
+    """No parameters."""
+
+    def normalisation(self, dim):
+        if len(dim) == 1:
+            return 3**5 / 40
+        return 3**7 * 7 / (478 * math.pi) if len(dim) == 2 else 3**7 / (40 * math.pi)
+
+    def w(self, dim, q):
+        a = larger(1.0 - q, 0.0 * q)
+        b = larger(2 / 3 - q, 0.0 * q)
+        c = larger(1 / 3 - q, 0.0 * q)
+        a2, b2, c2 = a * a, b * b, c * c
+        return a2 * a2 * a - 6.0 * b2 * b2 * b + 15.0 * c2 * c2 * c
+
+    def dw_over_q(self, dim, q):
+        # Outside q = 1/3: -5 [a^4 - 6 b^4] / q. Inside, the polynomial -40/9 + 40 q^2 - 50 q^3: its
+        # value at 1/3 and powers of c, which vanish outside, so nothing is divided by a small q.
+        c = larger(1 / 3 - q, 0.0 * q)
+        outer = larger(q, 0.0 * q + 1 / 3)
+        a = larger(1.0 - outer, 0.0 * q)
+        b = larger(2 / 3 - outer, 0.0 * q)
+        a2, b2 = a * a, b * b
+        return -5.0 * (a2 * a2 - 6.0 * b2 * b2) / outer + 10.0 * c * (5.0 * c * c - c - 1.0)
+
+    force_over_q = dw_over_q

@@ -1,0 +1,97 @@
+"""The density pass: seed eqs 7-8, 15-21 and 27-28."""
+
+import numpy as np
+from numba import njit
+
+from sph.compiled import COMPILED
+from sph.eos import pressure, sound_speed
+from sph.kernels import dw_over_q, normalisation
+from sph.neighbours.lists import IMAGE_SHIFT
+from sph.neighbours.order import BLOCK
+from sph.passes.smoothing import find_support
+from sph.viscosity import alpha_rate, balsara_factor
+
+
+@njit(**COMPILED)
+def density(
+    first_block, last_block, dim, models, neighbours, gas, alpha, fields, div_v, curl_v, f,
+    alpha_rates, wanted,
+):  # fmt: skip
+    """Density pass over blocks [first_block, last_block).
+
+    wanted (blocks,): 0, or the multiple of list_support to which a block must be listed before
+    the pass is run again. A particle whose support was not found gets a density of -1.
+    """
+    D = len(dim)
+    _, kernel, smoothing, eos, viscosity, balsara, support_ratio, eta = models
+    lists, images, list_support, reach_factor = neighbours
+    start, count, candidates = lists
+    sign, offset = images
+    position, velocity, mass, energy, support_before = gas
+    support, rho, Omega, pressure_term, c_s = fields
+    C = normalisation(kernel, dim)
+    size = 0
+    for block in range(first_block, last_block):
+        size = max(size, count[block])
+    x = np.empty((D, size))
+    v = np.empty((D, size))
+    m = np.empty(size)
+    r = np.empty(size)
+    for block in range(first_block, last_block):
+        nc = count[block]
+        for k in range(nc):
+            packed = candidates[start[block] + k]
+            j = packed & ((1 << IMAGE_SHIFT) - 1)
+            image = packed >> IMAGE_SHIFT
+            m[k] = mass[j]
+            for d in range(D):
+                x[d, k] = sign[image, d] * position[d, j] + offset[image, d]
+                if div_v is not None:
+                    v[d, k] = sign[image, d] * velocity[d, j]
+        wanted[block] = 0.0
+        for i in range(block * BLOCK, min((block + 1) * BLOCK, mass.size)):
+            for k in range(nc):
+                squared = 0.0
+                for d in range(D):
+                    squared += (position[d, i] - x[d, k]) ** 2
+                r[k] = np.sqrt(squared)
+            H, rho_i, Omega_i, needed = find_support(
+                smoothing, kernel, dim, r, m, nc, mass[i], support_before[i],
+                support_ratio * eta, reach_factor * list_support[i],
+            )  # fmt: skip
+            support[i], rho[i], Omega[i] = H, rho_i, Omega_i
+            if needed > 0.0:
+                wanted[block] = max(wanted[block], needed / list_support[i])
+                continue
+            P = pressure(eos, rho_i, energy[i])
+            c_i = sound_speed(eos, rho_i, P)
+            pressure_term[i] = P / (Omega_i * rho_i * rho_i)
+            c_s[i] = c_i
+            if div_v is not None:
+                H_inv = 1.0 / H
+                scale = -C * H_inv ** (D + 2) / (Omega_i * rho_i)
+                total = curl_x = curl_y = curl_z = 0.0
+                for k in range(nc):
+                    m_dw = m[k] * dw_over_q(kernel, dim, r[k] * H_inv)
+                    v_dot_r = 0.0
+                    for d in range(D):
+                        v_dot_r += (velocity[d, i] - v[d, k]) * (position[d, i] - x[d, k])
+                    total += m_dw * v_dot_r
+                    if curl_v is not None:
+                        r_x, r_y = position[0, i] - x[0, k], position[1, i] - x[1, k]
+                        v_x, v_y = velocity[0, i] - v[0, k], velocity[1, i] - v[1, k]
+                        curl_z += m_dw * (v_x * r_y - v_y * r_x)
+                        if D == 3:
+                            r_z, v_z = position[2, i] - x[2, k], velocity[2, i] - v[2, k]
+                            curl_x += m_dw * (v_y * r_z - v_z * r_y)
+                            curl_y += m_dw * (v_z * r_x - v_x * r_z)
+                div = scale * total  # eq 16, whose sign is a misprint: with v_ij = v_i - v_j, minus
+                div_v[i] = div
+                curl = 0.0
+                if curl_v is not None:
+                    curl = abs(scale) * np.sqrt(curl_x**2 + curl_y**2 + curl_z**2)  # eq 17
+                    curl_v[i] = curl
+                if f is not None:
+                    f[i] = balsara_factor(balsara, div, curl, c_i, H)  # eq 21
+                if alpha is not None:
+                    alpha_rates[i] = alpha_rate(viscosity, alpha[i], H / support_ratio, c_i, div)
