@@ -93,7 +93,7 @@ def run(text: str, threads=1, cache: Path | None = None) -> dict:
 
 
 def median_of(repeats: int, figure, **arguments) -> tuple[dict, dict]:
-    """The run with the median updates per CPU-second, and `figure` of all runs: min, median, max."""
+    """The run with the median figure, and `figure` of all runs: min, median, max."""
     runs = sorted((run(**arguments) for _ in range(repeats)), key=figure)
     values = [figure(one) for one in runs]
     return runs[len(runs) // 2], {
@@ -118,7 +118,8 @@ def engine(repeats: int) -> None:
     """3-D noisy lattice, 125 neighbours: microseconds of CPU an update, by phase."""
     print("## Engine: 3-D noisy lattice, 125 neighbours, double precision, one global step\n")
     run(uniform(n=4096, steps=3))  # fills the cache of compiled code
-    header("particles", "threads", "thousand updates per CPU-s (min … max)", "wall µs an update",
+    header("particles", "threads", "thousand updates per CPU-s (min … max)",
+           "wall µs an update",
            *(f"{phase} (µs)" for phase in PHASES), "list builds a step", "peak memory (MB)")  # fmt: skip
     peaks = {}
     for per_axis in (32, 64, 100):
@@ -130,7 +131,9 @@ def engine(repeats: int) -> None:
             updates = cost["updates"]
             row(
                 f"{per_axis}³", threads,
-                f"{rates['median'] / 1e3:.0f} ({rates['min'] / 1e3:.0f} … {rates['max'] / 1e3:.0f})",
+                "{median:.0f} ({min:.0f} … {max:.0f})".format(
+                    **{name: value / 1e3 for name, value in rates.items()}
+                ),
                 f"{1e6 * cost['wall_seconds'] / updates:.2f}",
                 *(f"{1e6 * cost['phases_cpu_seconds'][phase] / updates:.2f}" for phase in PHASES),
                 f"{cost['list_builds'] / cost['steps']:.2f}",

@@ -1,6 +1,6 @@
 """Write docs/configuration.md: every key of every problem, from the definitions themselves.
 
-    python scripts/write_configuration.py
+python scripts/write_configuration.py
 """
 
 from pathlib import Path
@@ -11,11 +11,12 @@ TARGET = Path(__file__).parents[1] / "docs" / "configuration.md"
 HEAD = """# Configuration
 
 Every key with its meaning, bounds and default, as `sph new PROBLEM` prints it. Written by
-`python scripts/write_configuration.py` from the definitions in the sources; not to be edited by hand.
+`python scripts/write_configuration.py` from the definitions in the sources, not by hand.
 
-A configuration is strict: an unknown key, a wrong type or a value out of bounds is an error that names file,
-line and the nearest valid name, all of them at once. A key that is left out takes its default; a problem may
-have defaults of its own for keys of the other tables. `--set a.b=VALUE` sets a key from the command line.
+A configuration is strict: an unknown key, a wrong type or a value out of bounds is an error that
+names file, line and the nearest valid name, all of them at once. A key that is left out takes its
+default; a problem may have defaults of its own for keys of the other tables. `--set a.b=VALUE`
+sets a key from the command line.
 """
 
 

@@ -19,6 +19,12 @@ FLAGS = {"fastmath": FASTMATH, "error_model": "numpy"}
 COMPILED = {"cache": True, "nogil": True, **FLAGS}
 
 
+# For functions with floating-point sums that others call. Where a callee is not inlined there are
+# two copies of it, compiled in different company, which may round differently: the process that
+# compiles calls one, and a process that finds the caller in the cache the other.
+INLINED = {**FLAGS, "forceinline": True}
+
+
 def verb(stub):
     """Make `stub(model, ...)` resolve at compile time to that method of the model's class.
 
@@ -35,7 +41,7 @@ def verb(stub):
 
     # Numba compares the names of the parameters, so the function it gets must have the stub's own.
     source = f"lambda {', '.join(parameters)}: pick({', '.join(parameters)})"
-    overload(stub, jit_options=FLAGS)(eval(source, {"pick": pick}))
+    overload(stub, jit_options=INLINED)(eval(source, {"pick": pick}))
     return stub
 
 

@@ -23,5 +23,17 @@ def load(package: str, name: str) -> ModuleType:
 
 
 def model_class(package: str, name: str) -> type:
-    """The NamedTuple class of a model file: its module-level name `Model`."""
-    return load(package, name).Model
+    """The NamedTuple that a model's file defines: the one class with fields and formulas in it.
+
+    Its name must be its own in the whole program: Numba tells named tuples apart by the name of the
+    class and the types of the fields, so two alike would silently share their formulas.
+    """
+    module = load(package, name)
+    (model,) = (
+        kind
+        for kind in vars(module).values()
+        if isinstance(kind, type)
+        and hasattr(kind, "_fields")
+        and kind.__module__ == module.__name__
+    )
+    return model

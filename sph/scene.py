@@ -68,7 +68,7 @@ class Scene:
             smoothing=smoothing,
             eos=self.eos,
             viscosity=self.viscosity,
-            balsara=balsara.Model() if physics.balsara else None,
+            balsara=balsara.Balsara() if physics.balsara else None,
             support_ratio=kernels.support_ratio(kernel, self.dimension),
             eta=float(physics.eta),
         )

@@ -32,6 +32,7 @@ class Totals(NamedTuple):
     max_density: float
     min_internal_energy: float
     max_internal_energy: float
+    rates: float  # of velocity and energy, all together: finite if each of them is
 
     @property
     def energy(self) -> float:
@@ -39,10 +40,10 @@ class Totals(NamedTuple):
 
 
 @njit(**COMPILED)
-def _totals(mass, velocity, energy, density):
+def _totals(mass, velocity, energy, density, acceleration, energy_rate):
     D, n = velocity.shape
     momentum = np.zeros(D)
-    kinetic = internal = 0.0
+    kinetic = internal = rates = 0.0
     lowest_density = lowest_energy = np.inf
     highest_density = highest_energy = -np.inf
     for d in range(D):
@@ -50,16 +51,19 @@ def _totals(mass, velocity, energy, density):
         for i in range(n):
             along += mass[i] * velocity[d, i]
             squares += mass[i] * velocity[d, i] ** 2
+            rates += acceleration[d, i]
         momentum[d] = along
         kinetic += 0.5 * squares
     for i in range(n):
         internal += mass[i] * energy[i]
+        rates += energy_rate[i]
         lowest_energy = min(lowest_energy, energy[i])
         highest_energy = max(highest_energy, energy[i])
         lowest_density = min(lowest_density, density[i])
         highest_density = max(highest_density, density[i])
     return (
-        kinetic, internal, momentum, lowest_density, highest_density, lowest_energy, highest_energy
+        kinetic, internal, momentum, lowest_density, highest_density, lowest_energy,
+        highest_energy, rates,
     )  # fmt: skip
 
 
@@ -252,12 +256,17 @@ class Simulation:
 
     def _sum(self) -> Totals:
         p = self.particles
-        return Totals(*_totals(p.mass, p.velocity, p.internal_energy, p.density))
+        return Totals(
+            *_totals(
+                p.mass, p.velocity, p.internal_energy, p.density, p.acceleration, p.energy_rate
+            )
+        )  # fmt: skip
 
     def _check(self) -> None:
         """Raise NumericalError where a number is not finite, a density or energy not positive."""
         t = self.totals
-        sound = np.isfinite(t.energy) and np.isfinite(t.max_density) and np.isfinite(self.limit.dt)
+        sums = (t.energy, t.max_density, t.rates, self.limit.dt)
+        sound = np.isfinite(sums).all()
         if sound and t.min_density > 0 and t.min_internal_energy >= 0 and self.limit.dt > 0:
             return
         p = self.particles
@@ -266,6 +275,7 @@ class Simulation:
             ("internal energy", p.internal_energy, ~(p.internal_energy >= 0)),
             ("velocity", p.velocity, ~np.isfinite(p.velocity)),
             ("acceleration", p.acceleration, ~np.isfinite(p.acceleration)),
+            ("rate of energy", p.energy_rate, ~np.isfinite(p.energy_rate)),
             ("signal speed", self._signal_speed, ~np.isfinite(self._signal_speed)),
         )
         for name, values, bad in tests:

@@ -93,8 +93,8 @@ class Physics(Section):
         from sph.viscosity import constant, switched
 
         if isinstance(self.alpha, AlphaRange):
-            return switched.Model(self.alpha.min, self.alpha.max)
-        return constant.Model(self.alpha)
+            return switched.SwitchedAlpha(self.alpha.min, self.alpha.max)
+        return constant.ConstantAlpha(self.alpha)
 
 
 def _named(model: str | dict[str, Any]) -> dict[str, Any]:

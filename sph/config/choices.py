@@ -38,7 +38,7 @@ class Choice:
 
 
 class ModelChoice(Choice):
-    """The same where the file's `Model` may have parameters, given in a table beside its name.
+    """The same where the file's model may have parameters, given in a table beside its name.
 
     Resolved, it is the name alone for a model without parameters, else a table with all of them.
     """

@@ -1,4 +1,4 @@
-"""Equations of state: one file each, its `Model` a NamedTuple with these methods.
+"""Equations of state: one file each, a NamedTuple with these methods.
 
     pressure(density, internal_energy)       P
     sound_speed(density, pressure)           c_s

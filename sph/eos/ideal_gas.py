@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 
-class Model(NamedTuple):
+class IdealGas(NamedTuple):
     """`gamma`: adiabatic index, the ratio of specific heats, above 1."""
 
     gamma: float

@@ -1,6 +1,6 @@
 """Smoothing kernels: W(r, H) = H^-D w(r/H) with compact support r < H (seed eq 9).
 
-A kernel is a file whose `Model` is a NamedTuple with these methods, all free of branches so that
+A kernel is a file that holds a NamedTuple with these methods, all free of branches so that
 the pair loop vectorises. `dim` is any tuple of length D, `q` = r/H >= 0; w and its derivative come
 without the normalisation C, which a loop applies once a particle.
 
@@ -39,10 +39,10 @@ def force_over_q(self, dim, q):
 def support_ratio(kernel, dimension: int) -> float:
     """H/h = 1/(2 sigma), sigma the kernel's standard deviation per axis (Dehnen & Aly 2012)."""
     dim = (0,) * dimension
-    # 40 nodes on either side of q = 1/2 integrate any piecewise polynomial used here exactly.
-    node, weight = np.polynomial.legendre.leggauss(40)
-    q = np.concatenate([(node + 1) / 4, (node + 3) / 4])
-    shell = np.tile(weight / 4, 2) * q ** (dimension - 1) * kernel.w(dim, q)
+    # Gauss's rule is exact for the polynomials that a kernel is made of, joined at sixths.
+    node, weight = np.polynomial.legendre.leggauss(20)
+    q = ((node + 1) / 2 + np.arange(6)[:, None]).ravel() / 6
+    shell = np.tile(weight, 6) * q ** (dimension - 1) * kernel.w(dim, q)
     variance = np.sum(shell * q**2) / np.sum(shell) / dimension
     return float(1 / (2 * np.sqrt(variance)))
 

@@ -6,7 +6,7 @@ from typing import NamedTuple
 from sph.compiled import larger
 
 
-class Model(NamedTuple):
+class CubicSpline(NamedTuple):
     """`flattened`: in the force, keep the gradient below q = 1/3 at its value there.
 
     (Thomas & Couchman 1992: particles at small separation still repel.) It enters eqs 22-23 only.

@@ -9,7 +9,7 @@ from typing import NamedTuple
 from sph.compiled import larger
 
 
-class Model(NamedTuple):
+class QuinticSpline(NamedTuple):
     """No parameters."""
 
     def normalisation(self, dim):

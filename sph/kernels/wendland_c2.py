@@ -6,7 +6,7 @@ from typing import NamedTuple
 from sph.compiled import larger
 
 
-class Model(NamedTuple):
+class WendlandC2(NamedTuple):
     """No parameters."""
 
     def normalisation(self, dim):

@@ -9,7 +9,7 @@ from typing import NamedTuple
 from sph.compiled import larger
 
 
-class Model(NamedTuple):
+class WendlandC6(NamedTuple):
     """No parameters."""
 
     def normalisation(self, dim):

@@ -32,7 +32,7 @@ def _gap(lower_a, upper_a, lower_b, upper_b):
     return max(0.0, max(lower_b - upper_a, lower_a - upper_b))
 
 
-@njit(**COMPILED)
+@njit(**COMPILED, forceinline=True)
 def _fill(chunk, tree, position, support, stretch, images, region, start, count, candidates):
     """List the blocks of one chunk into its region; return how much room they need."""
     first, last, lower, upper, largest = tree

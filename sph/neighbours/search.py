@@ -122,7 +122,7 @@ class Search:
         self.build(Origin(position.copy(), support, self.origin.skin), identity)
 
 
-@njit(**COMPILED)
+@njit(**COMPILED, forceinline=True)
 def _spacing(position, a, b):
     """Spacing s of the n particles [a, b): along axes s apart, they span prod (e + s) = n s^D."""
     D = position.shape[0]

@@ -1,6 +1,6 @@
 """Schemes: how a pair of particles push and heat each other. One file each.
 
-A scheme's `Model` is a NamedTuple with the method
+A scheme is a NamedTuple with the method
 
     pair(term_i, term_j, slope_i, slope_j, Pi)    (force, heating) of particle i by j
 

@@ -3,7 +3,7 @@
 from typing import NamedTuple
 
 
-class Model(NamedTuple):
+class GradH(NamedTuple):
     """Conserves energy and momentum pair by pair to round-off; entropy drifts in smooth flow."""
 
     def pair(self, term_i, term_j, slope_i, slope_j, Pi):

@@ -6,7 +6,7 @@ Their eq 7: dv_i/dt = -sum m_j [P_i/(Omega_i rho_i^2) grad W_i + P_j/(Omega_j rh
 from typing import NamedTuple
 
 
-class Model(NamedTuple):
+class Variational(NamedTuple):
     """Conserves energy, momentum and, without viscosity, entropy."""
 
     def pair(self, term_i, term_j, slope_i, slope_j, Pi):

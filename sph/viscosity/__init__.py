@@ -1,6 +1,6 @@
 """Artificial viscosity: how the coefficient alpha of a pair comes about, and Balsara's factor.
 
-A viscosity is a file whose `Model` is a NamedTuple with the methods
+A viscosity is a file that holds a NamedTuple with the methods
 
     pair_alpha(alpha_i, alpha_j)                     alpha of the pair (eq 24)
     alpha_rate(alpha, h, sound_speed, divergence)    its rate of change (eqs 27-28), if it evolves

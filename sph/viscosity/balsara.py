@@ -3,9 +3,10 @@
 from typing import NamedTuple
 
 
-class Model(NamedTuple):
+class Balsara(NamedTuple):
     """No parameters."""
 
     def balsara_factor(self, divergence, curl, sound_speed, support):
-        softening = 1e-4 * sound_speed / support
+        # 1e-300: zero over zero in cold gas at rest is no viscosity
+        softening = 1e-4 * sound_speed / support + 1e-300
         return abs(divergence) / (abs(divergence) + curl + softening)

@@ -3,7 +3,7 @@
 from typing import NamedTuple
 
 
-class Model(NamedTuple):
+class ConstantAlpha(NamedTuple):
     """`alpha`: the coefficient of eq 24."""
 
     alpha: float

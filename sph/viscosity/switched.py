@@ -8,7 +8,7 @@ from typing import NamedTuple
 from sph.compiled import larger
 
 
-class Model(NamedTuple):
+class SwitchedAlpha(NamedTuple):
     """`min`: where alpha decays to; `max`: where strong compression drives it."""
 
     min: float

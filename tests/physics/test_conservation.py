@@ -48,7 +48,8 @@ def test_energy_error_of_a_smooth_wave_falls_with_the_square_of_the_step():
     drift = []
     for C in (0.3, 0.15, 0.075):
         config = uniform_config(
-            "problem.dimension=1", "problem.n=100", "problem.velocity=0.0", f"physics.C={C}", "physics.alpha=0.0",
+            "problem.dimension=1", "problem.n=100", "problem.velocity=0.0",
+            f"physics.C={C}", "physics.alpha=0.0",
             "physics.density_passes='converged'", "time.end=1.0", problem=Wave,
         )  # fmt: skip
         drift.append(simulate(config).energy_drift)
@@ -61,7 +62,8 @@ def test_energy_error_of_a_smooth_wave_falls_with_the_square_of_the_step():
 @pytest.mark.parametrize("dimension", [1, 2, 3])
 def test_uniform_gas_at_rest_stays(dimension):
     outcome = simulate(
-        uniform_config(f"problem.dimension={dimension}", "problem.n=512", "problem.velocity=0.0"), 10
+        uniform_config(f"problem.dimension={dimension}", "problem.n=512", "problem.velocity=0.0"),
+        10,
     )
     p = outcome.particles
     # forces on a lattice cancel by symmetry, up to the 1e-10 to which supports are converged
@@ -70,7 +72,9 @@ def test_uniform_gas_at_rest_stays(dimension):
 
 
 def test_moving_gas_is_the_resting_one_in_motion():
-    at_rest = simulate(uniform_config("problem.noise=0.3", "problem.n=256", "problem.velocity=0.0"), 10)
+    at_rest = simulate(
+        uniform_config("problem.noise=0.3", "problem.n=256", "problem.velocity=0.0"), 10
+    )
     moving = simulate(
         uniform_config("problem.noise=0.3", "problem.n=256", "problem.velocity=[0.6, 0.4]"), 10
     )

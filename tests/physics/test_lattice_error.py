@@ -1,5 +1,7 @@
 """The floor under the density error: a lattice's own sum, which no number of particles lowers."""
 
+import itertools
+
 import numpy as np
 import pytest
 from conftest import CONFIGS, simulate
@@ -28,6 +30,6 @@ def test_it_does_not_fall_with_the_number_of_particles():
 
 def test_it_falls_with_eta():
     errors = [abs(density_error(100, eta)) for eta in (1.2, 1.6, 2.4, 3.2)]
-    assert all(later < earlier for earlier, later in zip(errors, errors[1:], strict=False))
+    assert all(later < earlier for earlier, later in itertools.pairwise(errors))
     # the transform of the kernel falls as the fourth power of the wave number (C2): eta^-4
     assert errors[3] < errors[1] / 8

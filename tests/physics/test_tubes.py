@@ -39,7 +39,9 @@ def test_density_peak_of_the_strong_shock(run):
     assert run("strong_shock").report()["peak_density"] == pytest.approx(6.30, abs=0.03)
 
 
-@pytest.mark.parametrize(("stem", "bound"), [("sod", 1e-4), ("shock_tube", 1e-4), ("strong_shock", 1e-4)])
+@pytest.mark.parametrize(
+    ("stem", "bound"), [("sod", 1e-4), ("shock_tube", 1e-4), ("strong_shock", 1e-4)]
+)
 def test_energy_of_the_tubes(run, stem, bound):
     # the transcription drifts by 1.0e-5 at C = 0.15; ten times that is still far below the error
     assert run(stem).energy_drift < bound

@@ -6,6 +6,7 @@ from sph import config, registry
 from sph.errors import ConfigError, FileError
 from sph.viscosity import constant, switched
 
+KERNELS = ", ".join(f'"{name}"' for name in registry.names("sph.kernels"))
 MINIMAL = '[problem]\nname = "shock_tube"\n'
 
 
@@ -80,7 +81,7 @@ def test_models():
     physics = default("physics.gamma=2", "physics.alpha=2").physics
     assert type(physics.kernel_model()) is registry.model_class("sph.kernels", "wendland_c2")
     assert physics.eos_model() == registry.model_class("sph.eos", "ideal_gas")(2.0)
-    assert type(physics.viscosity_model()) is constant.Model
+    assert type(physics.viscosity_model()) is constant.ConstantAlpha
     assert type(physics.viscosity_model().alpha) is float
 
 
@@ -91,7 +92,7 @@ def test_models_of_tables():
         "physics.eos={name = 'ideal_gas', gamma = 3}",
     ).physics
     viscosity = physics.viscosity_model()
-    assert type(viscosity) is switched.Model
+    assert type(viscosity) is switched.SwitchedAlpha
     assert (type(viscosity.min), type(viscosity.max)) == (float, float)
     assert viscosity == (0.0, 2.0)
     assert physics.kernel_model().flattened is True
@@ -332,18 +333,18 @@ WRONG = {
         "line 3: time = [{ end = 1 }]: expected a table [time]",
     ),
     "unknown kernel": (
-        '[physics]\nkernel = "wendland_c4"',
-        'line 4: physics.kernel = "wendland_c4": expected one of "cubic_spline", "wendland_c2", '
-        'or a table { name, its parameters }; did you mean "wendland_c2"?',
+        '[physics]\nkernel = "wendland_c3"',
+        f'line 4: physics.kernel = "wendland_c3": expected one of {KERNELS}, '
+        'or a table { name, its parameters }; did you mean "wendland_c6"?',
     ),
     "unknown kernel in a table": (
         '[physics]\nkernel = { name = "cubc_spline" }',
-        'line 4: physics.kernel.name = "cubc_spline": expected one of "cubic_spline", '
-        '"wendland_c2"; did you mean "cubic_spline"?',
+        f'line 4: physics.kernel.name = "cubc_spline": expected one of {KERNELS}; '
+        'did you mean "cubic_spline"?',
     ),
     "kernel table without a name": (
         "[physics]\nkernel = { flattened = true }",
-        'line 4: physics.kernel.name is missing: expected one of "cubic_spline", "wendland_c2"',
+        f"line 4: physics.kernel.name is missing: expected one of {KERNELS}",
     ),
     "unknown kernel parameter": (
         '[physics]\nkernel = { name = "cubic_spline", flatened = true }',
@@ -355,7 +356,7 @@ WRONG = {
     ),
     "kernel that is no name": (
         "[physics]\nkernel = 3",
-        'line 4: physics.kernel = 3: expected one of "cubic_spline", "wendland_c2", '
+        f"line 4: physics.kernel = 3: expected one of {KERNELS}, "
         "or a table { name, its parameters }",
     ),
     "bound of an eos parameter": (

@@ -1,0 +1,365 @@
+"""The engine against the dense transcription of the equations: every rate, and whole trajectories.
+
+Each case runs with lists built for the very state, with lists of an earlier state that are still
+good, and with lists too small for the supports found, so that they are widened on the way.
+"""
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import dense
+import numpy as np
+import pytest
+
+from sph import config, kernels, passes, schemes, simulation
+from sph.clock import Clock
+from sph.domain import Domain
+from sph.eos import ideal_gas
+from sph.neighbours import order as ordering
+from sph.neighbours.search import Origin, Search
+from sph.passes import density, rates
+from sph.passes.smoothing import Converged, FixedPasses
+from sph.problems import base
+from sph.scene import Scene
+from sph.threads import Team
+from sph.viscosity import balsara, constant, switched
+
+# Of the sum of absolute pair terms. With a count of passes both sides do the same sums in another
+# order: 6e-15 is seen. A converged H is off by TIGHT where the engine stops its iteration (the
+# transcription bisects to the last bit), and the rates, divided by an Omega down to 0.1, by up to
+# ten times as much: 9e-13 is seen.
+ROUND_OFF = 1e-11
+TIGHT = 1e-13
+SWITCHED = {"min": 0.2, "max": 2.0}
+
+
+class EagerTeam(Team):
+    """Hands over even a single block, which real teams find too little: N is small here."""
+
+    def run(self, function, items, *arguments, smallest=1):
+        super().run(function, items, *arguments, smallest=1)
+
+
+@dataclass(frozen=True)
+class Case:
+    """What is compiled in (kernel, kind of passes, viscosity, Balsara) and what is not."""
+
+    boundaries: tuple[str, ...]
+    kernel: str
+    passes: int | str
+    alpha: float | dict = 1.0
+    balsara: bool = True
+    flattened: bool = False
+
+    def __str__(self):
+        parts = [f"{len(self.boundaries)}d", *self.boundaries, self.kernel, str(self.passes)]
+        parts += ["switched"] * self.evolves + ["balsara"] * self.balsara
+        return "-".join(parts + ["flattened"] * self.flattened)
+
+    @property
+    def dimension(self):
+        return len(self.boundaries)
+
+    @property
+    def evolves(self):
+        return self.alpha is SWITCHED
+
+    @property
+    def eta(self):
+        return (1.3, 1.2, 1.0)[self.dimension - 1]  # supports stay within the box
+
+    @property
+    def box(self):
+        return np.array([[0.0, 1.0], [-0.5, 0.5], [1.0, 2.25]])[: self.dimension]
+
+    @property
+    def dense_scene(self):
+        return dense.Scene(
+            self.box,
+            self.boundaries,
+            eta=self.eta,
+            alpha=self.alpha,
+            kernel=self.kernel,
+            flattened=self.flattened,
+            balsara=self.balsara,
+            density_passes=self.passes,
+        )
+
+    @property
+    def models(self):
+        parameters = {"flattened": self.flattened} if self.kernel == "cubic_spline" else {}
+        kernel = kernels.make(self.kernel, **parameters)
+        return passes.Models(
+            scheme=schemes.make("grad_h"),
+            kernel=kernel,
+            smoothing=Converged(TIGHT) if self.passes == "converged" else FixedPasses(self.passes),
+            eos=ideal_gas.IdealGas(1.4),
+            viscosity=switched.SwitchedAlpha(**SWITCHED)
+            if self.evolves
+            else constant.ConstantAlpha(self.alpha),
+            balsara=balsara.Balsara() if self.balsara else None,
+            support_ratio=kernels.support_ratio(kernel, self.dimension),
+            eta=self.eta,
+        )
+
+
+W, S = "wendland_c2", "cubic_spline"
+PERIODIC, MIRROR, OPEN = "periodic", "mirror", "open"
+CASES = [
+    Case((PERIODIC,), W, 1, alpha=1.5),
+    Case((MIRROR,), W, 2),
+    Case((OPEN,), W, 3),
+    Case((MIRROR,), S, "converged", alpha=SWITCHED, balsara=False),
+    Case((PERIODIC,), S, "converged", alpha=SWITCHED, balsara=False, flattened=True),
+    Case((OPEN,), S, "converged", alpha=SWITCHED, balsara=False, flattened=True),
+    Case((PERIODIC, MIRROR), W, "converged", alpha=SWITCHED),
+    Case((OPEN, OPEN), W, "converged", alpha=SWITCHED),
+    Case((MIRROR, MIRROR), W, "converged", alpha=SWITCHED),
+    Case((PERIODIC, PERIODIC), S, 1, balsara=False),
+    Case((MIRROR, OPEN), S, 2, balsara=False, flattened=True),
+    Case((PERIODIC, PERIODIC, PERIODIC), W, 1, balsara=False),
+    Case((MIRROR, MIRROR, MIRROR), W, 2, balsara=False),
+    Case((PERIODIC, MIRROR, OPEN), W, 3, balsara=False),
+    Case((OPEN, OPEN, OPEN), S, "converged", alpha=SWITCHED),
+    Case((PERIODIC, PERIODIC, PERIODIC), S, "converged", alpha=SWITCHED, flattened=True),
+    Case((OPEN, PERIODIC, MIRROR), S, "converged", alpha=SWITCHED, flattened=True),
+]
+
+
+@dataclass
+class Particles:
+    """One gas, in one memory order."""
+
+    position: np.ndarray
+    velocity: np.ndarray
+    mass: np.ndarray
+    energy: np.ndarray
+    alpha: np.ndarray
+    support: np.ndarray  # H to begin with
+    earlier: np.ndarray  # positions the lists are built from
+    listed: np.ndarray  # supports likewise
+
+    def ordered(self, order):
+        return Particles(**{k: np.ascontiguousarray(a[..., order]) for k, a in vars(self).items()})
+
+
+def concentrated(box, count, random, beyond):
+    """(D, count) positions crowded near a corner, some as far as `beyond` out of the box."""
+    low, high = box.T[:, :, None]
+    d = len(box)
+    towards = random.uniform(-1, 1, (d, count))
+    towards /= abs(towards).max(axis=0)
+    # evenly thinned along the radius, so that no two particles meet and Omega stays off zero
+    radius = ((np.arange(count) + random.random(count)) / count) ** (2.2, 1.2, 0.8)[d - 1]
+    centre = low + 0.2 * (high - low)
+    position = centre + radius * np.where(towards < 0, centre - low, high - centre) * towards
+    position += beyond * np.sign(towards) * radius
+    if d > 1:  # in 1-D two in one place would alone have more mass than a support is to hold
+        position[:, 4] = position[:, 3]
+        position[0, 5] = low[0, 0]  # where a mirror puts the image too
+    return position
+
+
+def random_gas(case, lists, seed=3):
+    """Random particles with lists as asked for, and the skin of these."""
+    random = np.random.default_rng(seed)
+    count = (60, 150, 250)[case.dimension - 1]
+    # between two builds particles may be past a wall that they will be brought back through
+    position = concentrated(case.box, count, random, beyond=0.02 if lists == "reused" else 0.0)
+    mass = random.uniform(1, 1.3, count) / count
+    velocity = random.normal(size=position.shape)
+    energy, alpha = random.uniform(0.5, 2, count), random.uniform(*SWITCHED.values(), count)
+    converged = replace(case.dense_scene, density_passes="converged")
+    true = dense.rates(converged, position, velocity, mass, energy, np.full(count, 0.1)).support
+    support = random.uniform(0.97, 1.03, count) * true
+    earlier, listed, skin = position, support, 0.2
+    if lists == "reused":
+        # 0.1 H of motion and 3 % of H from two particles leave a reach of 1.1 H at least
+        shift = random.normal(size=position.shape)
+        earlier = position + 0.1 * true * shift / np.linalg.norm(shift, axis=0)
+        listed, skin = random.uniform(0.97, 1.03, count) * true, 0.32
+    if lists == "widened":
+        support = listed = 0.9 * support
+        skin = 0.01
+    return Particles(position, velocity, mass, energy, alpha, support, earlier, listed), skin
+
+
+def pass_over(function, team, case, gas, search, *arrays):
+    """Run a pass over all blocks with the arguments that both passes share."""
+    neighbours = passes.Neighbours(
+        search.lists, search.domain.images, search.origin.support, search.reach_factor
+    )
+    blocks = ordering.number_of_blocks(gas.mass.size)
+    state = passes.Gas(gas.position, gas.velocity, gas.mass, gas.energy, gas.support)
+    alpha = gas.alpha if case.evolves else None
+    dim = (0,) * case.dimension
+    team.run(function, blocks, dim, case.models, neighbours, state, alpha, *arrays)
+
+
+def run_engine(case, gas, skin, threads):
+    """(gas in block order, results by name, number of widenings)."""
+    team = EagerTeam(threads)
+    search = Search(Domain(case.box, case.boundaries), team)
+    count = gas.mass.size
+    gas = gas.ordered(search.order(gas.earlier, np.arange(count)))
+    identity = np.arange(count)
+    search.build(Origin(gas.earlier, gas.listed, skin), identity)
+    assert not search.stale(gas.position, gas.support)
+    # what a pass forgets to write stays NaN and is seen
+    fields = passes.Fields(*np.full((5, count), np.nan))
+    div_v = np.full(count, np.nan) if case.balsara or case.evolves else None
+    curl_v = np.full(count, np.nan) if case.balsara and case.dimension > 1 else None
+    f = np.full(count, np.nan) if case.balsara else None
+    alpha_rate = np.full(count, np.nan) if case.evolves else None
+    wanted = np.full(ordering.number_of_blocks(count), np.nan)
+    widenings = -1
+    while np.any(wanted != 0):
+        if wanted.max() > 0:
+            search.widen(gas.position, wanted, identity)
+        pass_over(
+            density.density, team, case, gas, search, fields, div_v, curl_v, f, alpha_rate, wanted
+        )
+        widenings += 1
+    acceleration = np.full(gas.position.shape, np.nan)
+    energy_rate, signal_speed = np.full((2, count), np.nan)
+    pass_over(
+        rates.rates, team, case, gas, search, fields, f, acceleration, energy_rate, signal_speed
+    )
+    team.close()
+    found = fields._asdict() | {
+        "divergence": div_v,
+        "curl": curl_v,
+        "balsara": f,
+        "alpha_rate": alpha_rate,
+        "acceleration": acceleration,
+        "energy_rate": energy_rate,
+        "signal_speed": signal_speed,
+    }
+    return gas, {name: array for name, array in found.items() if array is not None}, widenings
+
+
+@pytest.fixture
+def eager_order(monkeypatch):
+    """Let several threads share the ordering of a few particles."""
+    monkeypatch.setattr(ordering, "SMALLEST_RANGE", 0)
+
+
+@pytest.mark.usefixtures("eager_order")
+@pytest.mark.parametrize("lists", ["fresh", "reused", "widened"])
+@pytest.mark.parametrize("case", CASES, ids=str)
+def test_every_rate_is_that_of_the_equations(case, lists):
+    scattered, skin = random_gas(case, lists)
+    gas, found, widenings = run_engine(case, scattered, skin, threads=1)
+    alpha = gas.alpha if case.evolves else None
+    expected = dense.rates(
+        case.dense_scene, gas.position, gas.velocity, gas.mass, gas.energy, gas.support, alpha
+    )
+    # the gas is what it is meant to be: H varies tenfold, Omega does not blow round-off up
+    assert expected.support.max() > 10 * expected.support.min()
+    assert expected.omega.min() > 0.05
+    # and the lists too: where they fall short, each of three passes asks for no more than one more
+    assert widenings in ((1, 2, 3) if lists == "widened" else (0,))
+
+    found["pressure"] = found.pop("pressure_term") * found["omega"] * found["density"] ** 2
+    for name, values in found.items():
+        error = abs(values - getattr(expected, name))
+        scale = getattr(expected, f"{name}_scale")
+        assert np.all(error <= ROUND_OFF * scale), (name, np.max(error / scale))
+
+
+@pytest.mark.usefixtures("eager_order")
+@pytest.mark.parametrize("lists", ["reused", "widened"])
+@pytest.mark.parametrize("case", CASES[::4], ids=str)
+def test_two_threads_give_the_bits_of_one(case, lists):
+    scattered, skin = random_gas(case, lists)
+    _, one, _ = run_engine(case, scattered, skin, threads=1)
+    _, two, _ = run_engine(case, scattered, skin, threads=2)
+    for name, values in one.items():
+        assert values.tobytes() == two[name].tobytes(), name
+
+
+class GivenGas(base.Problem):
+    """A problem whose initial state is handed in."""
+
+    given: Any
+
+    def initial(self, eos):
+        return self.given
+
+
+def moving_gas(box, count):
+    """Particles scattered about a lattice, flowing at about the speed of sound."""
+    random = np.random.default_rng(5)
+    lattice = np.indices(count).reshape(len(count), -1)
+    low, length = box[:, :1], np.ptp(box, axis=1)[:, None]
+    n = lattice.shape[1]
+    position = (
+        low
+        + length * (lattice + random.uniform(0.2, 0.8, lattice.shape)) / np.array(count)[:, None]
+    )
+    velocity = random.normal(size=position.shape) + np.sin(2 * np.pi * position[::-1])
+    mass = random.uniform(1, 1.3, n) / n
+    return base.InitialState(position, velocity, mass, random.uniform(0.8, 1.6, n))
+
+
+def simulate(case, gas, end, threads=1):
+    """(the simulation at `end`, the times it went through); particles by ID and in the box."""
+    low, high = case.box.T
+    problem = GivenGas(
+        name="given",
+        dimension=case.dimension,
+        n=gas.mass.size,
+        domain=np.column_stack([low, high]).tolist(),
+        boundary=list(case.boundaries),
+        given=gas,
+    )
+    alpha = config.AlphaRange(**case.alpha) if case.evolves else case.alpha
+    physics = config.Physics(gamma=1.4, alpha=alpha, eta=case.eta, density_passes=case.passes)
+    whole = config.Config(
+        problem, physics, config.Time(end=end), config.Output(interval=end), config.Run()
+    )
+    clock = Clock()
+    run = simulation.Simulation.start(Scene(whole), threads, clock)
+    times = [run.time]
+    while run.time < end:
+        run.advance(end)
+        times.append(run.time)
+    run.close()
+    clock.close()
+    Domain(case.box, case.boundaries).bring_inside(run.particles.position, [run.particles.velocity])
+    return run, times
+
+
+TRAJECTORIES = [
+    (Case((MIRROR,), W, 2, alpha=1.5), (70,), 0.05),
+    (Case((PERIODIC, MIRROR), W, 2, alpha=SWITCHED), (11, 11), 0.1),
+]
+
+
+@pytest.mark.parametrize(("case", "count", "end"), TRAJECTORIES, ids=str)
+def test_trajectories_are_those_of_the_equations(case, count, end, monkeypatch):
+    gas = moving_gas(case.box, count)
+    run, times = simulate(case, gas, end)
+    expected = dense.start(case.dense_scene, *gas)
+    expected = dense.integrate(case.dense_scene, expected, end)
+    # 1e-9: the start's H is converged to 1e-10 only, and the flow hands its error on
+    np.testing.assert_allclose(times, [moment.time for moment in expected.history], rtol=1e-9)
+    found = run.particles.by_id()
+    length, speed = np.ptp(case.box, axis=1).min(), 1.0
+    for values, true, scale in (
+        (found.position, expected.position, length),
+        (found.velocity, expected.velocity, speed),
+        (found.internal_energy, expected.internal_energy, speed**2),
+        (found.support, expected.rates.support, length),
+        (found.alpha, expected.alpha if case.evolves else None, 1.0),
+    ):
+        if true is not None:
+            np.testing.assert_allclose(values, true, rtol=1e-9, atol=1e-9 * scale)
+    # lists were kept for some steps and built anew for others
+    assert 1 < run.list_builds < run.step
+
+    monkeypatch.setattr(ordering, "SMALLEST_RANGE", 0)
+    monkeypatch.setattr(simulation, "Team", EagerTeam)
+    again = simulate(case, gas, end, threads=2)[0].particles
+    for name, values in run.particles.arrays().items():
+        assert values.tobytes() == again.arrays()[name].tobytes(), name

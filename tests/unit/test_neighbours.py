@@ -1,0 +1,334 @@
+"""Order, tree and lists against brute force: nothing within reach may be missing, ever."""
+
+from itertools import pairwise
+
+import dense
+import numpy as np
+import pytest
+
+from sph.domain import Domain
+from sph.errors import NumericalError
+from sph.neighbours import lists, order
+from sph.neighbours.order import BLOCK
+from sph.neighbours.search import GROWTH, Origin, Search, best_skin, first_guess
+from sph.threads import Team
+
+SHAPES = ["random", "clustered", "line", "plane", "equal_coordinates", "coincident"]
+BOUNDARIES = [("mirror",), ("periodic", "mirror"), ("open", "periodic", "mirror")]
+
+
+class EagerTeam(Team):
+    """Hands over even a single item, which real teams find too little."""
+
+    def run(self, function, items, *arguments, smallest=1):
+        super().run(function, items, *arguments, smallest=1)
+
+
+def positions(shape, dimension, count, seed=1):
+    """(D, N) in the unit box."""
+    random = np.random.default_rng(seed)
+    x = random.random((dimension, count))
+    if shape == "clustered":
+        return 0.3 + 0.7 * (x - 0.3) * random.random(count) ** 4
+    if shape == "line":  # along a diagonal of the box
+        return np.repeat(x[:1], dimension, axis=0)
+    if shape == "plane":
+        x[-1] = 0.5
+    if shape == "equal_coordinates":  # a lattice of four values an axis: several in each place
+        return np.floor(4 * x) / 4
+    if shape == "coincident":
+        return np.full_like(x, 0.25)
+    return x
+
+
+def supports(dimension, count, seed=2):
+    """(N,) by a factor ten, few enough neighbours for lists to be worth having."""
+    return np.random.default_rng(seed).uniform(0.03, 0.3, count)
+
+
+def ordered(position, threads=1):
+    team = EagerTeam(threads)
+    found = order.block_order(position, np.arange(position.shape[1]), team)
+    team.close()
+    return found
+
+
+def search_over(boundaries, position, support, skin, threads=1):
+    """(Search, order) with lists built over these particles."""
+    d, count = position.shape
+    search = Search(Domain(np.tile([0.0, 1.0], (d, 1)), boundaries), EagerTeam(threads))
+    new = ordered(position)
+    origin = Origin(np.ascontiguousarray(position[:, new]), support[new], skin)
+    search.build(origin, np.arange(count))
+    return search, new
+
+
+def listed(search):
+    """(N, images, N) whether block of i lists the image of j; each at most once."""
+    count = search.origin.support.size
+    images = len(search.domain.images.sign)
+    found = np.zeros((count, images * count), dtype=int)
+    for block, (start, number) in enumerate(zip(*search.lists[:2], strict=True)):
+        packed = search.lists.candidates[start : start + number]
+        j, image = packed & (lists.MAX_PARTICLES - 1), packed >> lists.IMAGE_SHIFT
+        np.add.at(found[block * BLOCK : (block + 1) * BLOCK].T, image * count + j, 1)
+    assert found.max(initial=0) <= 1
+    return found.reshape(count, images, count).astype(bool)
+
+
+def distances(domain, position):
+    """(N, images, N) between i and the image of j."""
+    sign, offset = domain.images
+    image = sign[:, :, None] * position + offset[:, :, None]  # (images, D, N)
+    return np.linalg.norm(position.T[:, None, :, None] - image, axis=2)
+
+
+def missing(search, position, support):
+    """Pairs within the larger of their supports that are not in the lists."""
+    larger = np.maximum(support[:, None, None], support)
+    return np.count_nonzero((distances(search.domain, position) < larger) & ~listed(search))
+
+
+# --- order ---
+
+
+@pytest.mark.parametrize("shape", SHAPES)
+@pytest.mark.parametrize("dimension", [1, 2, 3])
+def test_order_depends_on_positions_and_ids_alone(shape, dimension):
+    position = positions(shape, dimension, 203)
+    identity = np.random.default_rng(3).permutation(203)
+    team = EagerTeam(1)
+    one = order.block_order(position, identity, team)
+    assert sorted(one) == list(range(203))
+    shuffle = np.random.default_rng(4).permutation(203)
+    other = order.block_order(np.ascontiguousarray(position[:, shuffle]), identity[shuffle], team)
+    np.testing.assert_array_equal(identity[one], identity[shuffle][other])
+
+
+@pytest.mark.parametrize("shape", ["random", "equal_coordinates"])
+@pytest.mark.parametrize("threads", [2, 3])
+def test_order_and_lists_do_not_depend_on_threads(shape, threads, monkeypatch):
+    monkeypatch.setattr(order, "SMALLEST_RANGE", 0)
+    position = positions(shape, 2, 1500)  # more chunks of blocks than threads
+    np.testing.assert_array_equal(ordered(position, threads), ordered(position))
+    support = supports(2, 1500) / 8
+    one, two = (
+        search_over(("periodic", "mirror"), position, support, 0.2, number)[0].lists
+        for number in (1, threads)
+    )
+    np.testing.assert_array_equal(one.count, two.count)
+    for block in range(one.count.size):
+        a, b = (a.candidates[a.start[block] :][: a.count[block]] for a in (one, two))
+        np.testing.assert_array_equal(a, b)
+
+
+@pytest.mark.parametrize("count", [2, 7, 8, 9, 16, 17, 31, 64, 65, 100])
+def test_blocks_are_full_compact_and_split_at_the_median(count):
+    position = positions("random", 1, count)
+    in_order = position[0, ordered(position)]
+    # in 1-D a split at the median leaves every block to the right of the one before
+    blocks = [in_order[a : a + BLOCK] for a in range(0, count, BLOCK)]
+    assert len(blocks) == order.number_of_blocks(count)
+    for left, right in pairwise(blocks):
+        assert len(left) == BLOCK
+        assert left.max() < right.min()
+
+
+def test_the_longest_axis_is_split():
+    position = positions("random", 3, 16) * np.array([[1.0], [9.0], [1.0]])
+    y = position[1, ordered(position)]
+    assert y[:BLOCK].max() < y[BLOCK:].min()
+
+
+# --- lists ---
+
+
+@pytest.mark.parametrize("boundaries", BOUNDARIES, ids=str)
+@pytest.mark.parametrize("shape", SHAPES)
+def test_lists_hold_all_within_the_larger_support(shape, boundaries):
+    d = len(boundaries)
+    position, support = positions(shape, d, 203), supports(d, 203)
+    search, new = search_over(boundaries, position, support, 0.0)
+    assert missing(search, position[:, new], support[new]) == 0
+    assert search.lists.count.size == order.number_of_blocks(203)
+
+
+@pytest.mark.parametrize("count", [*range(2, 20), 63, 64, 65, 100])
+def test_lists_of_few_particles(count):
+    position, support = positions("random", 2, count), supports(2, count)
+    search, new = search_over(("periodic", "mirror"), position, support, 0.1)
+    assert missing(search, position[:, new], 1.1 * support[new]) == 0
+
+
+def test_lists_do_not_hold_what_is_out_of_reach():
+    position, support = positions("random", 2, 203), supports(2, 203)
+    search, new = search_over(("open", "periodic"), position, support, 0.1)
+    x, largest = (
+        position[:, new],
+        np.repeat([support[new][a : a + BLOCK].max() for a in range(0, 203, BLOCK)], BLOCK)[:203],
+    )
+    # the box of a block is no further from any of its particles than its diagonal
+    diagonal = np.repeat(
+        [np.linalg.norm(np.ptp(x[:, a : a + BLOCK], axis=1)) for a in range(0, 203, BLOCK)], BLOCK
+    )[:203]
+    reach = 1.1 * np.maximum(largest[:, None, None], support[new]) + diagonal[:, None, None]
+    assert not np.any(listed(search) & (distances(search.domain, x) > reach))
+
+
+@pytest.mark.parametrize("boundaries", BOUNDARIES, ids=str)
+@pytest.mark.parametrize("seed", range(4))
+def test_lists_call_themselves_stale_before_they_miss_a_pair(boundaries, seed):
+    """Random motion, step by step: as long as the lists are trusted they are complete."""
+    random = np.random.default_rng(seed)
+    d, count = len(boundaries), 120
+    position, support = positions("random", d, count, seed), supports(d, count, seed)
+    search, new = search_over(boundaries, position, support, 0.25)
+    x, H = position[:, new], support[new]
+    direction = random.normal(size=x.shape) * random.choice([0.02, 0.2, 1], count)
+    steps = 0
+    while not search.stale(x, H):
+        # trusted to the reach, not only to the supports of this moment
+        reach = (1 - 1e-12) * search.reach_factor * search.origin.support
+        assert missing(search, x, reach) == 0
+        x = x + 0.007 * direction * H.min()
+        H = H * (1 + 0.003 * random.uniform(-1, 1.5, count))
+        steps += 1
+    assert steps > 5
+
+
+@pytest.mark.parametrize(
+    ("moves", "growth", "trusted"),
+    # skin 0.2: two particles that moved m supports each leave a reach of 1.2 - 2 m
+    [
+        (0.0, 1.19, True),
+        (0.0, 1.21, False),
+        (0.05, 1.09, True),
+        (0.05, 1.11, False),
+        (0.09, 1.0, True),
+        (0.11, 1.0, False),
+        (0.11, 0.9, True),
+    ],
+)
+def test_lists_are_trusted_until_the_skin_is_used_up(moves, growth, trusted):
+    position = np.array([[0.2, 0.8]])
+    search, _ = search_over(("open",), position, np.array([0.1, 0.1]), 0.2)
+    moved = position + np.array([[moves * 0.1, 0.0]])
+    grown = np.array([0.1, 0.1]) * growth
+    assert search.stale(moved, grown) != trusted
+
+
+def test_two_particles_that_approach_are_stale_before_they_meet():
+    # listed within 0.12; from 0.1201 apart, each goes towards the other
+    position, H = np.array([[0.4, 0.5201]]), np.array([0.1, 0.1])
+    far = np.linspace(2, 9, 15)[None]  # company, so that the two are in blocks of their own
+    search, _ = search_over(
+        ("open",), np.concatenate([-far, position, far], axis=1), np.full(32, 0.1), 0.2
+    )
+    x = search.origin.position.copy()
+    i, j = np.flatnonzero((x[0] > 0) & (x[0] < 1))
+    assert i // BLOCK != j // BLOCK
+    assert not listed(search)[i, 0, j]
+    for step in np.linspace(0, 0.02, 41):
+        moved = x.copy()
+        moved[0, i] += step * np.sign(x[0, j] - x[0, i])
+        moved[0, j] -= step * np.sign(x[0, j] - x[0, i])
+        meet = abs(moved[0, i] - moved[0, j]) < H[0]
+        assert search.stale(moved, np.full(32, 0.1)) or not meet
+    assert meet  # the motion did bring them together
+
+
+def test_a_search_without_lists_is_stale():
+    search = Search(Domain(np.array([[0.0, 1.0]]), ("open",)), Team(1))
+    assert search.stale(np.zeros((1, 3)), np.ones(3))
+
+
+@pytest.mark.parametrize("boundaries", BOUNDARIES, ids=str)
+def test_widening_lists_the_asking_blocks_further_and_the_others_no_less(boundaries):
+    d = len(boundaries)
+    position, support = positions("random", d, 100), supports(d, 100) / 2
+    search, new = search_over(boundaries, position, support, 0.1)
+    x = position[:, new] + 0.004
+    wanted = np.zeros(order.number_of_blocks(100))
+    wanted[[2, 5]] = 1.5, 3.0
+    search.widen(x, wanted, np.arange(100))
+    asked = support[new] * np.repeat(np.maximum(wanted, 1), BLOCK)[:100]
+    assert missing(search, x, 1.1 * asked) == 0
+    np.testing.assert_array_equal(search.origin.support, asked)
+    assert not search.stale(x, asked)
+
+
+def test_supports_and_numbers_that_cannot_be_served_are_refused(monkeypatch):
+    position = positions("random", 1, 10)
+    with pytest.raises(NumericalError, match="wider than the periodic box along x"):
+        search_over(("periodic",), position, np.full(10, 0.95), 0.1)
+    monkeypatch.setattr(lists, "MAX_PARTICLES", 9)
+    search = Search(Domain(np.array([[0.0, 1.0]]), ("open",)), Team(1))
+    with pytest.raises(NumericalError, match="10 particles are more than the 9"):
+        search.order(position, np.arange(10))
+
+
+def test_lists_built_again_are_the_same_whatever_room_was_left():
+    position, support = positions("random", 2, 700), supports(2, 700) / 4
+    search, _ = search_over(("periodic", "mirror"), position, support, 0.1)
+    first = listed(search)
+    few = Origin(search.origin.position, 0.2 * search.origin.support, 0.1)
+    for origin in (few, search.origin):  # from little room to much, and back
+        search.build(origin, np.arange(700))
+    np.testing.assert_array_equal(listed(search), first)
+
+
+# --- skin and first guess ---
+
+
+@pytest.mark.parametrize("dimension", [1, 2, 3])
+def test_skin_falls_short_of_no_step_and_grows_with_it_until_it_does_not_pay(dimension):
+    assert best_skin(0.0, dimension) == GROWTH  # lists for ever need only the room for growth
+    for step in (1e-4, 1e-3, 1e-2):
+        kept = (best_skin(step, dimension) - GROWTH) / (2 * step) + 1
+        assert 1 <= kept <= 20
+        assert kept == pytest.approx(round(kept), abs=1e-9)  # a whole number of steps; rounding
+    assert best_skin(1e3, dimension) == GROWTH  # too fast to keep any: build at every step
+
+
+def arranged(shape, dimension, count, random):
+    """(D, N) as a problem may place particles: noisy lattice, concentration, sheet or filament."""
+    filled = {"sheet": dimension - 1, "filament": 1}.get(shape, dimension)
+    side = round(count ** (1 / filled))
+    x = np.indices((side,) * filled).reshape(filled, -1) + random.uniform(0.2, 0.8, (filled, 1))
+    x = (x + random.uniform(-0.3, 0.3, x.shape)) / side - 0.5
+    if shape == "concentration":
+        x *= 2 * abs(x).max(axis=0)
+    return np.concatenate([x, np.zeros((dimension - filled, x.shape[1]))])
+
+
+@pytest.mark.parametrize(
+    ("shape", "dimension"),
+    [(shape, d) for shape in ("noise", "concentration") for d in (1, 2, 3)]
+    + [("sheet", 2), ("sheet", 3), ("filament", 3)],
+)
+def test_first_guess_is_near_the_support_it_leads_to(shape, dimension):
+    position = arranged(shape, dimension, 300, np.random.default_rng(7))
+    position = np.ascontiguousarray(position[:, ordered(position)])
+    count = position.shape[1]
+    scene = dense.Scene(
+        np.tile([-0.5, 0.5], (dimension, 1)), ("open",) * dimension, density_passes="converged"
+    )
+    guess = first_guess(position, scene.h_ratio * scene.eta)
+    gas = np.zeros_like(position), np.ones(count), np.ones(count)
+    factor = guess / dense.rates(scene, position, *gas, guess).support
+    # ten: Newton is there in some four steps, each bounded by a factor two
+    assert 1 / 10 < factor.min() <= factor.max() < 10
+
+
+@pytest.mark.parametrize("count", [2, 3, 8, 9, 33])
+@pytest.mark.parametrize("shape", ["random", "line", "plane"])
+def test_first_guess_of_few_particles_is_finite_and_positive(shape, count):
+    guess = first_guess(positions(shape, 3, count), 2.5)
+    assert np.all(np.isfinite(guess) & (guess > 0))
+
+
+def test_first_guess_where_a_block_lies_in_one_place_is_positive():
+    position = positions("random", 3, 100)
+    position[:, : 2 * BLOCK] = 0.5
+    guess = first_guess(np.ascontiguousarray(position[:, ordered(position)]), 2.5)
+    assert np.all(np.isfinite(guess) & (guess > 0))
