@@ -118,9 +118,9 @@ def engine(repeats: int) -> None:
     """3-D noisy lattice, 125 neighbours: microseconds of CPU an update, by phase."""
     print("## Engine: 3-D noisy lattice, 125 neighbours, double precision, one global step\n")
     run(uniform(n=4096, steps=3))  # fills the cache of compiled code
-    header("particles", "threads", "thousand updates per CPU-s (min … max)",
-           "wall µs an update",
-           *(f"{phase} (µs)" for phase in PHASES), "list builds a step", "peak memory (MB)")  # fmt: skip
+    phases = [f"{phase} (µs)" for phase in PHASES]
+    header("particles", "threads", "thousand updates per CPU-s (min … max)", "wall µs an update",
+           *phases, "list builds a step", "peak memory (MB)")  # fmt: skip
     peaks = {}
     for per_axis in (32, 64, 100):
         for threads in (1, 2):
