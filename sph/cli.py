@@ -76,9 +76,8 @@ def restart(source, overrides, threads, directory):
     from sph import progress, runner
     from sph.analysis import summary
 
-    checkpoint, number, target = runner.prepare_restart(source, directory)
-    config = checkpoint.config.override(_with_threads(overrides, threads))
-    result = runner.restart(config, checkpoint, number, target, progress.suited())
+    overrides = _with_threads(overrides, threads)
+    result, target = runner.restart(source, overrides, directory, progress.suited())
     click.echo(summary.in_words(result))
     click.echo(f"Results: {target.path} (`sph plot {target.path}` draws them).")
 
@@ -87,7 +86,7 @@ def restart(source, overrides, threads, directory):
 @click.argument("sources", metavar="RUN_OR_CHECKPOINT...", nargs=-1, required=True,
                 type=click.Path(path_type=Path))  # fmt: skip
 @click.option("-o", "target", type=click.Path(path_type=Path), metavar="FILE",
-              help="The picture's file, for one picture; else they go to figures/ of the run.")  # fmt: skip
+              help="The file of one picture; else they go to figures/ of the run.")  # fmt: skip
 def plot(sources, target):
     """Draw runs or checkpoints: profiles, maps, slices and the history."""
     from sph.analysis import figures
@@ -99,7 +98,7 @@ def plot(sources, target):
 @main.command()
 @click.argument("problem")
 @click.option("-o", "target", type=click.Path(path_type=Path), metavar="FILE",
-              help="Write to FILE, which must not be there yet, instead of the terminal.")  # fmt: skip
+              help="Write to FILE, which must not be there yet.")  # fmt: skip
 def new(problem, target):
     """Print a configuration for PROBLEM with every key, its meaning, bounds and default."""
     from sph import config as configuration
@@ -119,7 +118,7 @@ def list_choices():
     """Name the problems, kernels, schemes and the other choices there are."""
     from sph import registry
 
-    for package in ("problems", "kernels", "schemes", "eos"):
+    for package in ("problems", "kernels", "schemes", "eos", "conductivity"):
         click.echo(f"{package}:")
         for name in registry.names(f"sph.{package}"):
             module = registry.load(f"sph.{package}", name)

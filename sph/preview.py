@@ -30,7 +30,7 @@ def describe(config: Config) -> str:
     inside, outside = simulation.scene.parts()
     particles = simulation.particles
     steps = math.ceil(config.time.end / limit.dt)
-    outputs = 1 + len(output_times(config.time.end, config.output.interval))
+    outputs = 1 + sum(1 for _ in output_times(config.time.end, config.output.interval))
     memory = bytes_held(simulation)
     lines = [
         "The configuration is valid.",
@@ -38,7 +38,8 @@ def describe(config: Config) -> str:
         *(f"  {part}" for part in inside),
         "Left out:",
         *(f"  {part}" for part in outside),
-        f"Particles: {particles.number}, {neighbours_per_particle(simulation):.0f} neighbours each.",
+        f"Particles: {particles.number}, "
+        f"{neighbours_per_particle(simulation):.0f} neighbours each.",
         f"Memory: {memory / 1e6:.1f} MB for the particles and their lists "
         f"({memory / particles.number:.0f} bytes each), beside some 250 MB for Python and Numba.",
         f"First step: {limit.dt:.4g}, set by the {limit.criterion.replace('_', ' ')} of particle "

@@ -1,5 +1,6 @@
 """Progress of a run: a bar with the time left on a terminal, plain lines elsewhere."""
 
+import os
 import sys
 import time
 
@@ -7,48 +8,46 @@ import time
 LINE_INTERVAL = 10.0
 
 
-class Quiet:
-    """Says nothing."""
-
-    def start(self, begin, end): ...
-    def step(self, simulation): ...
-    def wrote(self, path, simulation): ...
-    def close(self): ...
-
-
-class Lines(Quiet):
+class Lines:
     """A line now and then, for logs."""
 
-    def __init__(self, stream=None):
-        self.stream = stream or sys.stderr
-        self._last = time.monotonic()
+    def note(self, text):
+        print(text, file=sys.stderr, flush=True)
 
     def start(self, begin, end):
-        self.begin, self.end = begin, end
-        self._started = time.monotonic()
+        self.end = end
+        self._from = None  # time simulated and clock at the end of the first step
+        self._last = time.monotonic()
 
     def step(self, simulation):
         now = time.monotonic()
+        if self._from is None:  # the first step may have compiled: it says nothing of the pace
+            self._from = simulation.time, now
         if now - self._last < LINE_INTERVAL:
             return
         self._last = now
-        done = (simulation.time - self.begin) / (self.end - self.begin)
-        left = (now - self._started) * (1 - done) / done
-        print(
-            f"step {simulation.step}, t = {simulation.time:.5g} of {self.end:.5g} "
-            f"({100 * done:.0f} %), dt = {simulation.limit.dt:.3g}, about {left:.0f} s left",
-            file=self.stream,
-            flush=True,
+        self.note(
+            f"step {simulation.step}, t = {simulation.time:.5g} of {self.end:.5g}, "
+            f"dt = {simulation.limit.dt:.3g}{self._left(simulation.time, now)}"
         )
 
+    def _left(self, simulated, now):
+        begin, started = self._from
+        if not simulated > begin:
+            return ""
+        left = (now - started) * (self.end - simulated) / (simulated - begin)
+        return f", about {left:.0f} s left"
+
     def wrote(self, path, simulation):
-        print(f"t = {simulation.time:.6g}: wrote {path.name}", file=self.stream, flush=True)
+        self.note(f"t = {simulation.time:.6g}: wrote {path.name}")
+
+    def close(self): ...
 
 
-class Bar(Quiet):
+class Bar(Lines):
     """A bar over the simulated time."""
 
-    FORMAT = "{percentage:3.0f}%|{bar}| t = {postfix} [{elapsed}, {remaining} left]"
+    FORMAT = "{percentage:3.0f}%|{bar}| {desc} [{elapsed}, {remaining} left]"
 
     def start(self, begin, end):
         import tqdm
@@ -57,12 +56,16 @@ class Bar(Quiet):
         self._bar = tqdm.tqdm(total=end - begin, bar_format=self.FORMAT, leave=False)
 
     def step(self, simulation):
-        self._bar.set_postfix_str(
-            f"{simulation.time:.4g} of {self.end:.4g}, step {simulation.step}, "
+        self._bar.set_description_str(
+            f"t = {simulation.time:.4g} of {self.end:.4g}, step {simulation.step}, "
             f"dt {simulation.limit.dt:.2g}",
             refresh=False,
         )
-        self._bar.update(simulation.time - self.begin - self._bar.n)
+        # set, not added up: a sum of rounded parts may pass the total, of which tqdm warns
+        self._bar.n = simulation.time - self.begin
+        self._bar.update(0)
+
+    def wrote(self, path, simulation): ...
 
     def close(self):
         if hasattr(self, "_bar"):
@@ -71,4 +74,9 @@ class Bar(Quiet):
 
 def suited():
     """A bar where someone is watching a terminal, lines otherwise."""
-    return Bar() if sys.stderr.isatty() else Lines()
+    try:
+        # some pseudo-terminals have no width, and no bar would show on them
+        watched = sys.stderr.isatty() and os.get_terminal_size(sys.stderr.fileno()).columns > 0
+    except OSError:
+        watched = False
+    return Bar() if watched else Lines()

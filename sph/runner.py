@@ -1,14 +1,18 @@
 """Run a simulation to its end: checkpoints, history, progress, and the summary it closes with."""
 
+import itertools
+import math
 import os
-import signal
-from contextlib import contextmanager
+from collections.abc import Iterator, Sequence
+from contextlib import closing, contextmanager
 from pathlib import Path
+
+import numpy as np
 
 from sph.analysis import summary
 from sph.clock import Clock
 from sph.config import Config
-from sph.errors import FileError, NumericalError, Stopped
+from sph.errors import ConfigError, FileError, NumericalError, Stopped
 from sph.neighbours.search import Origin
 from sph.output import checkpoint as checkpoints
 from sph.output.checkpoint import Checkpoint
@@ -18,73 +22,128 @@ from sph.output.history import read as read_history
 from sph.output.run_directory import RunDirectory, checkpoint_number, find
 from sph.scene import Scene
 from sph.simulation import Simulation
+from sph.stop_signals import stop_signals
 
-# A time closer than this, relative to the interval, to an output is that output.
+# A time closer than this to an output, relative to the interval or the end, is that output.
 SAME_TIME = 1e-9
 
 
 def run(config: Config, directory: RunDirectory, progress) -> dict:
     """Run `config` from its initial state in an empty run directory; returns the summary.
 
-    `progress` has start(time, end), step(simulation), wrote(path) and close(). Raises NumericalError
-    or Stopped, with what was reached kept in the directory.
+    `progress` has note(text), start(time, end), step(simulation), wrote(path, simulation) and
+    close(). Raises NumericalError or Stopped, with what was reached kept in the directory.
     """
-    clock = Clock()
-    directory.write_config(config.to_toml())
-    simulation = Simulation.start(Scene(config), threads_of(config), clock)
-    extra = config.problem.diagnostics(simulation.particles)
-    history = History.create(directory.history, config.problem.dimension, list(extra))
-    return _Runner(config, directory, simulation, history, progress, number=0).from_start()
+    with stop_signals() as stopped_by, closing(Clock()) as clock:
+        progress.note("preparing: the first run of a scene compiles its code, for up to a minute")
+        simulation = Simulation.start(Scene(config), threads_of(config), clock)
+        directory.write_config(config.to_toml())
+        history = _new_history(config, simulation, directory)
+        runner = _Runner(config, directory, simulation, history, progress, stopped_by)
+        return runner.from_start()
 
 
 def restart(
-    config: Config, checkpoint: Checkpoint, number: int, directory: RunDirectory, progress
-) -> dict:
-    """Go on from `checkpoint`, which is number `number` of `directory`; later ones are replaced.
+    source: Path, overrides: Sequence[str], directory: Path | None, progress
+) -> tuple[dict, RunDirectory]:
+    """Go on from `source`, a checkpoint or a run directory, whose last good one is then taken.
 
-    `config` is the checkpoint's with what the user changed. Returns the summary.
-    """
-    clock = Clock()
-    directory.write_config(config.to_toml())
-    directory.drop_checkpoints_after(number)
-    origin = Origin(checkpoint.list_position, checkpoint.list_support, checkpoint.list_skin)
-    simulation = Simulation.resume(
-        Scene(config), checkpoint.particles, checkpoint.time, checkpoint.step,
-        checkpoint.next_step, origin, threads_of(config), clock,
-    )  # fmt: skip
-    if directory.history.exists():
-        history = History.resume(directory.history, checkpoint.step)
-    else:  # a lone checkpoint: the history begins with it
-        extra = config.problem.diagnostics(simulation.particles)
-        history = History.create(directory.history, config.problem.dimension, list(extra))
-    lineage = (*checkpoint.lineage, f"restarted at step {checkpoint.step}, t = {checkpoint.time!r}")
-    runner = _Runner(config, directory, simulation, history, progress, number + 1, lineage)
-    return runner.from_checkpoint()
-
-
-def prepare_restart(source: Path, directory: Path | None):
-    """The checkpoint to go on from, its number, and the run directory to go on in.
-
-    source: a run directory or a checkpoint; directory: a new run directory, or None for the one
-    that the checkpoint is in. Raises FileError.
+    Later checkpoints are replaced. overrides: `a.b=VALUE`; directory: a new run directory, or None
+    for the one that the checkpoint is in. Returns the summary and the run directory. Raises as
+    `run`, and FileError and ConfigError before anything is changed.
     """
     home, path = find(source)
     checkpoint = checkpoints.read(path)
+    config = checkpoint.config.override(overrides)
+    _check_changes(config, checkpoint)
+    if source.is_dir():
+        _note_damaged(home, path, progress)
+    target, number = _place_to_go_on(home, path, directory)
+    target.write_config(config.to_toml())
+    with stop_signals() as stopped_by, closing(Clock()) as clock:
+        simulation = _resumed(config, checkpoint, clock)
+        target.drop_checkpoints_after(number)
+        target.summary.unlink(missing_ok=True)  # a run that is killed must not keep the old one
+        if target.history.exists():
+            history = History.resume(target.history, checkpoint.step)
+        else:
+            history = _new_history(config, simulation, target)
+        lineage = f"restarted at step {checkpoint.step}, t = {checkpoint.time!r}"
+        runner = _Runner(config, target, simulation, history, progress, stopped_by)
+        runner.number, runner.saved_step = number + 1, checkpoint.step
+        runner.lineage = (*checkpoint.lineage, lineage)
+        return runner.from_checkpoint(), target
+
+
+def _resumed(config: Config, checkpoint: Checkpoint, clock: Clock) -> Simulation:
+    origin = Origin(checkpoint.list_position, checkpoint.list_support, checkpoint.list_skin)
+    return Simulation.resume(
+        Scene(config), checkpoint.particles, checkpoint.time, checkpoint.step,
+        _coming_step(config, checkpoint), origin, threads_of(config), clock,
+    )  # fmt: skip
+
+
+def _coming_step(config: Config, checkpoint: Checkpoint) -> float:
+    """The checkpoint's next step, or what becomes of it under other limits (eq 32)."""
+    now, before, p = config.physics, checkpoint.config.physics, checkpoint.particles
+    step = checkpoint.next_step * (now.C / before.C)  # unchanged where C is: bit for bit
+    if now.energy_limit and not before.energy_limit:
+        with np.errstate(divide="ignore"):
+            step = min(step, float(now.C * np.min(p.internal_energy / np.abs(p.energy_rate))))
+    return step
+
+
+def _check_changes(config: Config, checkpoint: Checkpoint) -> None:
+    """Raise ConfigError where `config` wants what the particles of a checkpoint cannot give."""
+    before, after = checkpoint.config.problem.model_dump(), config.problem.model_dump()
+    wrong = [
+        f"problem.{key} cannot be changed in a restart: the particles are there already"
+        for key in after
+        if key not in before or after[key] != before[key]
+    ]
+    if Scene(config).evolves_alpha != (checkpoint.particles.alpha is not None):
+        kind = "one number" if checkpoint.particles.alpha is None else "a range"
+        wrong.append(f"physics.alpha: expected {kind}, as in the checkpoint")
+    if config.time.end < checkpoint.time:
+        wrong.append(
+            f"time.end = {config.time.end}: expected a later time than the checkpoint's, "
+            f"{checkpoint.time}"
+        )
+    if wrong:
+        raise ConfigError("\n".join(wrong))
+
+
+def _note_damaged(home: RunDirectory, good: Path, progress) -> None:
+    """Say which checkpoints after the last good one were passed over."""
+    for path in home.checkpoints():
+        if checkpoint_number(path) > checkpoint_number(good):
+            progress.note(f"{path} cannot be read: going on from {good.name}")
+
+
+def _place_to_go_on(
+    home: RunDirectory | None, path: Path, directory: Path | None
+) -> tuple[RunDirectory, int]:
+    """The run directory to go on in, filled where it is a new one; the checkpoint's number."""
     if directory is None and home is None:
         raise FileError(f"{path} is not in a run directory.\nTry: -o DIR, to go on in a new one.")
     if directory is None or (home is not None and directory.resolve() == home.path.resolve()):
-        return checkpoint, checkpoint_number(path), home
+        return home, checkpoint_number(path)
     target = RunDirectory.create(directory)
-    number = checkpoint_number(path) or 0
     if home is None:
-        number = 0
         copy_file(path, target.checkpoint_path(0))
-    else:
-        for earlier in home.checkpoints():
-            if checkpoint_number(earlier) <= number:
-                copy_file(earlier, target.checkpoint_path(checkpoint_number(earlier)))
+        return target, 0
+    number = checkpoint_number(path)
+    for earlier in home.checkpoints():
+        if checkpoint_number(earlier) <= number:
+            copy_file(earlier, target.checkpoint_path(checkpoint_number(earlier)))
+    if home.history.exists():
         copy_file(home.history, target.history)
-    return checkpoint, number, target
+    return target, number
+
+
+def _new_history(config: Config, simulation: Simulation, directory: RunDirectory) -> History:
+    extra = config.problem.diagnostics(simulation.particles)
+    return History.create(directory.history, config.problem.dimension, list(extra))
 
 
 def threads_of(config: Config) -> int:
@@ -94,25 +153,33 @@ def threads_of(config: Config) -> int:
     return config.run.threads
 
 
-def output_times(end: float, interval: float) -> list[float]:
-    """Times of the checkpoints after the first: every interval, and the end."""
-    times = []
-    while (len(times) + 1) * interval < end - SAME_TIME * interval:
-        times.append((len(times) + 1) * interval)
-    return [*times, end]
+def output_times(end: float, interval: float, after: float = 0.0) -> Iterator[float]:
+    """Times of the checkpoints later than `after`: every interval, and the end."""
+    same = SAME_TIME * min(interval, end)
+    for k in itertools.count(max(1, math.floor(after / interval))):
+        # to the digits a decimal number keeps: 3 x 0.1 is 0.3, where a run to 0.3 would end
+        time = float(f"{k * interval:.15g}")
+        if time >= end - same:
+            break
+        if time > after + same:
+            yield time
+    if end > after + same:
+        yield end
 
 
 class _Runner:
     """The loop over steps and outputs of one session."""
 
-    def __init__(self, config, directory, simulation, history, progress, number, lineage=()):
+    def __init__(self, config, directory, simulation, history, progress, stopped_by):
         self.config = config
         self.directory = directory
         self.simulation = simulation
         self.history = history
         self.progress = progress
-        self.number = number  # of the next checkpoint
-        self.lineage = lineage
+        self.stopped_by = stopped_by  # signals that came, see stop_signals
+        self.number = 0  # of the next checkpoint
+        self.saved_step = None  # step of the last checkpoint
+        self.lineage = ()
         self.wall_before = self.cpu_before = 0.0  # of earlier sessions
 
     def from_start(self) -> dict:
@@ -127,6 +194,8 @@ class _Runner:
             if past["step"].size:
                 self.wall_before = past["wall_seconds"][-1]
                 self.cpu_before = past["cpu_seconds"][-1]
+            else:  # a lone checkpoint: it begins the history, and has no limiter to tell
+                self._record()
             return self._to_end()
 
     @contextmanager
@@ -137,22 +206,20 @@ class _Runner:
             self.history.close()
             self.progress.close()
             self.simulation.close()
-            self.simulation.clock.close()
 
     def _to_end(self) -> dict:
         simulation, end = self.simulation, self.config.time.end
+        times = output_times(end, self.config.output.interval, simulation.time)
         self.progress.start(simulation.time, end)
         try:
-            with _stop_signals() as stopped_by:
-                for output in output_times(end, self.config.output.interval):
-                    while simulation.time < output:
-                        if stopped_by:
-                            self._stop(stopped_by[0])
-                        simulation.advance(output)
-                        self._record()
-                        self.progress.step(simulation)
-                    if simulation.time == output:
-                        self._write_checkpoint()
+            for output in times:
+                while simulation.time < output:
+                    if self.stopped_by:
+                        self._stop(self.stopped_by[0])
+                    simulation.advance(output)
+                    self._record()
+                    self.progress.step(simulation)
+                self._write_checkpoint()
         except NumericalError as error:
             self._close("failed", reason=str(error))
             last = self.directory.checkpoint_path(self.number - 1)
@@ -163,11 +230,14 @@ class _Runner:
         return self._close("done")
 
     def _stop(self, name: str) -> None:
-        path = self._write_checkpoint()
+        simulation = self.simulation
+        if self.saved_step != simulation.step:
+            self._write_checkpoint()
         self._close("stopped", reason=name)
         raise Stopped(
-            f"stopped by {name} at t = {self.simulation.time:.6g}, step {self.simulation.step}; "
-            f"wrote {path}.\n`sph restart {self.directory.path}` goes on from there."
+            f"stopped by {name} at t = {simulation.time:.6g}, step {simulation.step}, with "
+            f"{self.directory.checkpoint_path(self.number - 1)}.\n"
+            f"`sph restart {self.directory.path}` goes on from there."
         )
 
     def _record(self) -> None:
@@ -189,12 +259,13 @@ class _Runner:
             "wall_seconds": round(self.wall_before + simulation.clock.wall, 6),
             "cpu_seconds": round(self.cpu_before + simulation.clock.cpu, 6),
         }
-        row |= {f"momentum_{axis}": p for axis, p in zip("xyz", totals.momentum.tolist(), strict=False)}
+        momentum = zip("xyz", totals.momentum.tolist(), strict=False)
+        row |= {f"momentum_{axis}": component for axis, component in momentum}
         with simulation.clock.phase("diagnostics"):
             row |= self.config.problem.diagnostics(simulation.particles)
         self.history.append(row)
 
-    def _write_checkpoint(self) -> Path:
+    def _write_checkpoint(self) -> None:
         """Write the state, after the history up to it."""
         simulation, origin = self.simulation, self.simulation.search.origin
         path = self.directory.checkpoint_path(self.number)
@@ -215,8 +286,8 @@ class _Runner:
                 ),
             )
         self.number += 1
+        self.saved_step = simulation.step
         self.progress.wrote(path, simulation)
-        return path
 
     def _close(self, status: str, reason: str | None = None) -> dict:
         self.history.flush()
@@ -228,27 +299,3 @@ class _Runner:
         )
         self.directory.write_summary(result)
         return result
-
-
-@contextmanager
-def _stop_signals():
-    """A list that holds the name of the first SIGINT or SIGTERM once one has come.
-
-    A second one acts as it would without us, for those who cannot wait for the end of a step.
-    """
-    came: list[str] = []
-    numbers = (signal.SIGINT, signal.SIGTERM)
-
-    def note(number, _frame):
-        came.append("Ctrl-C" if number == signal.SIGINT else signal.Signals(number).name)
-        for one in numbers:
-            signal.signal(one, before[one])
-
-    before = {number: signal.getsignal(number) for number in numbers}
-    for number in numbers:
-        signal.signal(number, note)
-    try:
-        yield came
-    finally:
-        for number in numbers:
-            signal.signal(number, before[number])

@@ -41,6 +41,10 @@ class Scene:
         return self.viscosity.evolves
 
     @property
+    def conducts(self) -> bool:
+        return self.config.physics.conductivity is not None
+
+    @property
     def needs_curl(self) -> bool:
         return self.config.physics.balsara and self.dimension > 1
 
@@ -68,6 +72,7 @@ class Scene:
             smoothing=smoothing,
             eos=self.eos,
             viscosity=self.viscosity,
+            conductivity=physics.conductivity_model(),
             balsara=balsara.Balsara() if physics.balsara else None,
             support_ratio=kernels.support_ratio(kernel, self.dimension),
             eta=float(physics.eta),
@@ -96,6 +101,7 @@ class Scene:
                 outside.append(f"{what}: {why_not}")
 
         part(self.evolves_alpha, "equation for alpha", "alpha is one number")
+        part(self.conducts, "artificial conductivity", "physics.conductivity is not given")
         part(physics.balsara, "Balsara factor", "physics.balsara = false")
         part(self.needs_divergence, "divergence of velocity", "neither Balsara nor alpha needs it")
         part(

@@ -75,6 +75,9 @@ class Simulation:
     """
 
     def __init__(self, scene: Scene, particles: Particles, threads: int, clock: Clock):
+        with clock.phase("start of Numba"):
+            # its tables are filled on first use; here, so that no phase of a step pays for it
+            cpu_target.target_context.refresh()
         self.scene = scene
         self.particles = particles
         self.clock = clock
@@ -103,9 +106,6 @@ class Simulation:
     @classmethod
     def start(cls, scene: Scene, threads: int, clock: Clock) -> "Simulation":
         """From the problem's initial state: converged supports, rates, and the first step."""
-        with clock.phase("start of Numba"):
-            # its tables are filled on first use; here, so that no phase of a step pays for it
-            cpu_target.target_context.refresh()
         with clock.phase("initial state"):
             initial = scene.config.problem.initial(scene.eos)
             alpha = float(scene.viscosity.start()) if scene.evolves_alpha else None
@@ -240,7 +240,8 @@ class Simulation:
         with self.clock.phase("rates"):
             self.team.run(
                 rates.rates, self._wanted.size, self._dim, models, self._neighbours(),
-                self._gas(), self._alpha, self._fields(p.support), self._balsara, p.acceleration,
+                self._gas(), self._alpha, self._fields(p.support), self._balsara,
+                self._energy if self.scene.conducts else None, p.acceleration,
                 p.energy_rate, self._signal_speed,
             )  # fmt: skip
 

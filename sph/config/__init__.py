@@ -53,6 +53,11 @@ class Physics(Section):
         1.0,
         description="artificial viscosity: one coefficient for all, or a range to switch it",
     )
+    conductivity: Annotated[Any, ModelChoice("sph.conductivity")] | None = Field(
+        None,
+        description="artificial conductivity, which smooths contacts; none if not given",
+        examples=[{"name": "pressure_jump", "strength": 1.0}],
+    )
     eta: float = Field(
         1.6, gt=0, description="smoothing length in units of the local particle spacing"
     )
@@ -87,6 +92,14 @@ class Physics(Section):
         from sph import eos
 
         return eos.make(**_named(self.eos or {"name": "ideal_gas", "gamma": self.gamma}))
+
+    def conductivity_model(self):
+        """The artificial conductivity, a NamedTuple of `sph.conductivity`, or None."""
+        if self.conductivity is None:
+            return None
+        named = _named(self.conductivity)
+        model = registry.model_class("sph.conductivity", named["name"])
+        return model(**{key: value for key, value in named.items() if key != "name"})
 
     def viscosity_model(self):
         """The artificial viscosity, a NamedTuple of `sph.viscosity`."""

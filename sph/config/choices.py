@@ -12,7 +12,7 @@ from sph.problems.base import Section
 Gamma = Annotated[float, Field(gt=1)]
 
 # Bounds of the models' parameters: their NamedTuples know types and defaults, not bounds.
-_PARAMETERS = {"gamma": Gamma}
+_PARAMETERS = {"gamma": Gamma, "strength": Annotated[float, Field(ge=0)]}
 
 
 class Choice:

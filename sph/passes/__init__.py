@@ -7,7 +7,8 @@ particle of the block: gather only, one writer a particle, in a fixed order, so 
 depend on the number of threads.
 
 Arguments that are None leave their part out of the compiled code: div_v (nothing needs the
-divergence), curl_v (1-D, or no Balsara factor), f (no Balsara factor), alpha (one constant).
+divergence), curl_v (1-D, or no Balsara factor), f (no Balsara factor), alpha (one constant),
+conducted (no conductivity).
 """
 
 from typing import NamedTuple
@@ -23,6 +24,7 @@ class Models(NamedTuple):
     smoothing: tuple
     eos: tuple
     viscosity: tuple
+    conductivity: tuple | None
     balsara: tuple | None
     support_ratio: float  # H/h of the kernel
     eta: float

@@ -23,7 +23,7 @@ def density(
     the pass is run again. A particle whose support was not found gets a density of -1.
     """
     D = len(dim)
-    _, kernel, smoothing, eos, viscosity, balsara, support_ratio, eta = models
+    _, kernel, smoothing, eos, viscosity, _, balsara, support_ratio, eta = models
     lists, images, list_support, reach_factor = neighbours
     start, count, candidates = lists
     sign, offset = images

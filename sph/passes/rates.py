@@ -4,6 +4,8 @@ import numpy as np
 from numba import njit
 
 from sph.compiled import COMPILED, larger, smaller
+from sph.conductivity import exchange_speed
+from sph.eos import pressure
 from sph.kernels import force_over_q, normalisation
 from sph.neighbours.lists import IMAGE_SHIFT
 from sph.neighbours.order import BLOCK
@@ -15,8 +17,8 @@ TINY = 1e-300  # keeps 1/r finite where r_ij = 0 and the vector it multiplies is
 
 @njit(**COMPILED)
 def rates(
-    first_block, last_block, dim, models, neighbours, gas, alpha, fields, f, acceleration,
-    energy_rate, signal_speed,
+    first_block, last_block, dim, models, neighbours, gas, alpha, fields, f, conducted,
+    acceleration, energy_rate, signal_speed,
 ):  # fmt: skip
     """Rate pass over blocks [first_block, last_block): eqs 22-26.
 
@@ -24,7 +26,7 @@ def rates(
     particle over its pairs and itself (eq 32).
     """
     D = len(dim)
-    scheme, kernel, _, _, viscosity, _, _, _ = models
+    scheme, kernel, _, eos, viscosity, conductivity, _, _, _ = models
     lists, images, _, _ = neighbours
     start, count, candidates = lists
     sign, offset = images
@@ -44,6 +46,8 @@ def rates(
     gradient = np.empty(size)
     alphas = np.empty(size if alpha is not None else 0)
     fs = np.empty(size if f is not None else 0)
+    us = np.empty(size if conducted is not None else 0)
+    Ps = np.empty(size if conducted is not None else 0)
     force = np.empty(size)
     for block in range(first_block, last_block):
         nc = count[block]
@@ -64,10 +68,15 @@ def rates(
                 alphas[k] = alpha[j]
             if f is not None:
                 fs[k] = 0.5 * f[j]
+            if conducted is not None:
+                us[k] = conducted[j]
+                Ps[k] = pressure(eos, density[j], conducted[j])
         for i in range(block * BLOCK, min((block + 1) * BLOCK, mass.size)):
             rho_i, P_term_i, c_i = density[i], pressure_term[i], sound_speeds[i]
             H_inv_i = 1.0 / support[i]
             gradient_i = 1.0 / support[i] ** (D + 2)
+            if conducted is not None:
+                P_i = pressure(eos, rho_i, conducted[i])
             heating = 0.0
             fastest = 0.0
             for k in range(nc):
@@ -92,8 +101,13 @@ def rates(
                 Pi *= v_sig * w_ij * (inverse * r)
                 if f is not None:
                     Pi *= 0.5 * f[i] + fs[k]
-                force[k], heat = pair(scheme, P_term_i, P_term[k], slope_i, slope_j, Pi)
-                heating += heat * v_dot_r
+                force[k], work = pair(scheme, P_term_i, P_term[k], slope_i, slope_j, Pi)
+                heating += work * v_dot_r
+                if conducted is not None:
+                    speed = exchange_speed(conductivity, P_i, Ps[k], rho_i, rho[k], w_ij)
+                    # Price (2008) eq 27: over rho_ij = (rho_i + rho_j)/2; slope r is m_j dW/dr
+                    exchange = speed * (conducted[i] - us[k]) * 2.0 * (inverse * r)
+                    heating += (slope_i + slope_j) * r * exchange
                 fastest = larger(fastest, v_sig if slope_i + slope_j < 0.0 else 0.0)
             energy_rate[i] = heating
             signal_speed[i] = fastest

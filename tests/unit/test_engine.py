@@ -97,6 +97,7 @@ class Case:
             viscosity=switched.SwitchedAlpha(**SWITCHED)
             if self.evolves
             else constant.ConstantAlpha(self.alpha),
+            conductivity=None,
             balsara=balsara.Balsara() if self.balsara else None,
             support_ratio=kernels.support_ratio(kernel, self.dimension),
             eta=self.eta,
@@ -223,7 +224,17 @@ def run_engine(case, gas, skin, threads):
     acceleration = np.full(gas.position.shape, np.nan)
     energy_rate, signal_speed = np.full((2, count), np.nan)
     pass_over(
-        rates.rates, team, case, gas, search, fields, f, acceleration, energy_rate, signal_speed
+        rates.rates,
+        team,
+        case,
+        gas,
+        search,
+        fields,
+        f,
+        None,
+        acceleration,
+        energy_rate,
+        signal_speed,
     )
     team.close()
     found = fields._asdict() | {

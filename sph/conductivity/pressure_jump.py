@@ -1,0 +1,19 @@
+"""Conductivity at the speed that a pressure jump would drive (Price 2008, eqs 27-28).
+
+It acts where the pressure jumps and energy differs: at a contact until its pressure is even, and at
+the start of a shock. It must not be used with gravity, where pressure varies in equilibrium.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+
+class PressureJump(NamedTuple):
+    """`strength`: 1 is the value of the paper."""
+
+    strength: float = 1.0
+
+    def exchange_speed(self, pressure_i, pressure_j, density_i, density_j, w_ij):
+        rho_ij = 0.5 * (density_i + density_j)
+        return self.strength * np.sqrt(abs(pressure_i - pressure_j) / rho_ij)

@@ -1,0 +1,451 @@
+"""The program as a user meets it: exit codes, messages, signals."""
+
+import json
+import os
+import re
+import shutil
+import signal
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+
+import h5py
+import pytest
+from click.testing import CliRunner
+
+import sph
+from sph import config as configuration
+from sph import progress, registry
+from sph.cli import main
+from sph.output.checkpoint import state_hash
+from sph.output.run_directory import RunDirectory
+
+ROOT = Path(sph.__file__).parents[1]
+CONFIGS = Path(__file__).parents[2] / "configs"
+TUBE = """\
+[problem]
+name = "shock_tube"
+n = 60
+[time]
+end = 0.2
+[output]
+interval = 0.05
+[run]
+threads = 1
+"""
+
+
+def sph_(*arguments):
+    """The program in this process."""
+    return CliRunner().invoke(main, [str(one) for one in arguments])
+
+
+def started(directory, *arguments, **environment):
+    """The program in a process of its own, its output in pipes."""
+    path = os.pathsep.join([str(ROOT), os.environ.get("PYTHONPATH", "")])
+    return subprocess.Popen(
+        [sys.executable, "-m", "sph.cli", *map(str, arguments)],
+        cwd=directory,
+        env={**os.environ, "PYTHONPATH": path, **environment},
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        # a shell may have told its background jobs to ignore it
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
+    )
+
+
+def read_until(stream, words):
+    """Read lines up to the one with `words`; all of them."""
+    lines = []
+    for line in stream:
+        lines.append(line)
+        if words in line:
+            return "".join(lines)
+    raise AssertionError(f"{words!r} never came, but {lines}")
+
+
+def finished(process):
+    """Exit code, stdout and stderr once the process has ended."""
+    out, err = process.communicate(timeout=120)
+    return process.returncode, out, err
+
+
+def hashes(run):
+    """SHA-256 of the state of every checkpoint, by step."""
+    found = {}
+    for path in RunDirectory(run).checkpoints():
+        with h5py.File(path) as file:
+            state = {name: dataset[()] for name, dataset in file["Checkpoint"].items()}
+        found[int(state["step"])] = state_hash(state)
+    return found
+
+
+def assert_told(result, code, *words):
+    """That exit code, a message on stderr with these words, and no traceback."""
+    assert result.exit_code == code, result.output
+    assert isinstance(result.exception, SystemExit)
+    assert "Traceback" not in result.output
+    for word in words:
+        assert word in result.stderr
+    assert result.stdout == ""
+
+
+@pytest.fixture
+def config(tmp_path):
+    path = tmp_path / "tube.toml"
+    path.write_text(TUBE)
+    return path
+
+
+@pytest.fixture(scope="module")
+def done(tmp_path_factory):
+    """A run, and what the program said."""
+    directory = tmp_path_factory.mktemp("done")
+    (directory / "tube.toml").write_text(TUBE)
+    result = sph_("run", directory / "tube.toml", "-o", directory / "run")
+    assert result.exit_code == 0, result.output
+    return directory / "run", result
+
+
+def copied(done, directory):
+    return shutil.copytree(done[0], directory)
+
+
+# --- exit code 0 ------------------------------------------------------------------------------
+
+
+def test_run_tells_the_summary_and_nothing_else_on_stdout(done):
+    run, result = done
+    lines = result.stdout.splitlines()
+    # the tube takes the number nearest to 60 that fills both sides
+    assert re.fullmatch(r"shock_tube: 61 particles to t = 0\.2 in \d+ steps \(done\)\.", lines[0])
+    assert lines[1].startswith("Error (L1 against the exact solution, the whole domain): density ")
+    assert any(line.startswith("Kept: energy to ") for line in lines)
+    assert any(line.startswith("Cost: ") and "compiling" in line for line in lines)
+    assert lines[-1] == f"Results: {run} (`sph plot {run}` draws them)."
+    assert "wrote checkpoint_000004.h5" in result.stderr
+    assert "wrote" not in result.stdout
+
+
+def test_a_run_directory_holds_what_is_promised(done):
+    run = done[0]
+    found = {str(path.relative_to(run)) for path in run.rglob("*") if path.is_file()}
+    assert found == {"config.toml", "history.csv", "summary.json"} | {
+        f"checkpoints/checkpoint_{k:06d}.h5" for k in range(5)
+    }
+    resolved = configuration.load(run / "config.toml")
+    assert resolved == configuration.from_text(TUBE)
+    assert set(json.loads((run / "summary.json").read_text())) == {
+        "status", "reason", "version", "problem", "dimension", "particles", "time", "steps",
+        "errors", "report", "conservation", "cost", "compiled_in", "left_out",
+    }  # fmt: skip
+
+
+def test_the_default_directory_is_named_after_the_configuration(config, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert sph_("run", "tube.toml", "--set", "time.end=0.01").exit_code == 0
+    assert (tmp_path / "runs" / "tube" / "summary.json").exists()
+
+
+def test_set_and_threads(config, tmp_path):
+    result = sph_(
+        "run", config, "-o", tmp_path / "run", "--set", "physics.alpha=2.0", "--threads", 2,
+        "--set", "physics.kernel=wendland_c2", "--set", "time.end = 0.01",
+    )  # fmt: skip
+    assert result.exit_code == 0
+    assert "on 2 thread(s)" in result.stdout
+    resolved = configuration.load(tmp_path / "run" / "config.toml")
+    assert (resolved.physics.alpha, resolved.run.threads, resolved.time.end) == (2.0, 2, 0.01)
+
+
+def test_force_replaces_a_run(done, config, tmp_path):
+    run = copied(done, tmp_path / "run")
+    (run / "notes.txt").write_text("mine")
+    assert_told(sph_("run", config, "-o", run), 4, "holds a run already", "--force", "sph restart")
+    assert hashes(run) == hashes(done[0])
+    result = sph_("run", config, "-o", run, "--force", "--set", "time.end=0.07")
+    assert result.exit_code == 0
+    assert [path.name for path in RunDirectory(run).checkpoints()] == [
+        f"checkpoint_{k:06d}.h5" for k in range(3)
+    ]
+    assert (run / "notes.txt").read_text() == "mine"
+
+
+def test_restart_in_place_and_elsewhere(done, tmp_path):
+    run = copied(done, tmp_path / "run")
+    result = sph_("restart", run, "--set", "time.end=0.25", "--threads", 2)
+    assert result.exit_code == 0
+    assert f"Results: {run} " in result.stdout
+    assert "t = 0.25: wrote checkpoint_000005.h5" in result.stderr
+    other = tmp_path / "other"
+    source = run / "checkpoints" / "checkpoint_000002.h5"
+    result = sph_("restart", source, "-o", other, "--set", "time.end=0.25")
+    assert result.exit_code == 0
+    assert f"Results: {other} " in result.stdout
+    assert hashes(other) == hashes(run)
+
+
+def test_restart_says_that_it_passes_over_a_damaged_checkpoint(done, tmp_path):
+    run = copied(done, tmp_path / "run")
+    last = run / "checkpoints" / "checkpoint_000004.h5"
+    os.truncate(last, 5000)
+    result = sph_("restart", run)
+    assert result.exit_code == 0
+    assert "checkpoint_000004.h5 cannot be read: going on from checkpoint_000003" in result.stderr
+    assert hashes(run) == hashes(done[0])
+
+
+@pytest.mark.parametrize("path", sorted(CONFIGS.glob("*.toml")), ids=lambda path: path.stem)
+def test_shipped_configurations_are_valid(path):
+    resolved = configuration.load(path)
+    assert path.stem.startswith(resolved.problem.name) or resolved.problem.name == "shock_tube"
+    assert configuration.from_text(resolved.to_toml()) == resolved
+
+
+def test_every_problem_has_a_shipped_configuration_of_its_name():
+    for name in registry.names("sph.problems"):
+        assert configuration.load(CONFIGS / f"{name}.toml").problem.name == name
+
+
+@pytest.mark.parametrize("name", registry.names("sph.problems"))
+def test_new_writes_a_valid_configuration(name, tmp_path):
+    result = sph_("new", name)
+    assert result.exit_code == 0
+    assert tomllib.loads(result.stdout)["problem"]["name"] == name
+    target = tmp_path / "new.toml"
+    assert sph_("new", name, "-o", target).stdout == f"wrote {target}\n"
+    assert target.read_text() == result.stdout
+    assert configuration.load(target).problem.name == name
+    assert_told(sph_("new", name, "-o", target), 4, "there already", "Try: ")
+
+
+def test_what_new_writes_runs(tmp_path):
+    target = tmp_path / "new.toml"
+    sph_("new", "shock_tube", "-o", target)
+    result = sph_("run", target, "-o", tmp_path / "run", "--set", "time.end=0.001")
+    assert result.exit_code == 0, result.output
+
+
+def test_list_names_every_choice():
+    result = sph_("list")
+    assert result.exit_code == 0
+    sections = dict(re.findall(r"^(\w+):\n((?:  .*\n)+)", result.stdout, re.MULTILINE))
+    for section in ("problems", "kernels", "schemes", "eos"):
+        named = [line.split()[0] for line in sections[section].splitlines()]
+        assert named == registry.names(f"sph.{section}")
+        assert all(len(line.split()) > 3 for line in sections[section].splitlines())
+
+
+def test_dry_run_writes_nothing(config, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    result = sph_("run", "tube.toml", "--dry-run")
+    assert result.exit_code == 0
+    assert "The configuration is valid." in result.stdout
+    assert os.listdir(tmp_path) == ["tube.toml"]
+
+
+@pytest.mark.parametrize("command", [[], ["run"], ["restart"], ["plot"], ["new"], ["list"]])
+def test_help(command):
+    result = sph_(*command, "--help")
+    assert result.exit_code == 0
+    assert "Usage: " in result.stdout
+
+
+def test_version():
+    assert sph_("--version").stdout == f"sph, version {sph.__version__}\n"
+
+
+# --- exit code 2 ------------------------------------------------------------------------------
+
+
+def test_all_that_is_wrong_is_told_at_once_with_its_line(tmp_path):
+    path = tmp_path / "bad.toml"
+    path.write_text(TUBE.replace("n = 60", "n = 'many'").replace("interval", "intervall"))
+    result = sph_("run", path, "-o", tmp_path / "run", "--set", "physics.C=-1")
+    assert_told(result, 2, f"{path}, line 3: problem.n", f"{path}, line 7: output.intervall")
+    assert "did you mean interval?" in result.stderr
+    assert "--set physics.C=-1: physics.C" in result.stderr
+    assert len(result.stderr.splitlines()) == 3
+    assert not (tmp_path / "run").exists()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["--set", "physics.aplha=1.0"], ["physics.aplha", "alpha"]),
+        (["--set", "physics.alpha"], ["--set physics.alpha: expected TABLE.KEY=VALUE"]),
+        (["--set", "physics.gamma=0.9"], ["physics.gamma", "0.9"]),
+        (["--set", "physics.kernel=wendland"], ["physics.kernel", "wendland_c2"]),
+        (["--set", "problem.name=shock_tub"], ["problem.name", "shock_tube"]),
+        (["--set", "time.end=soon"], ["time.end", "soon"]),
+        (["--threads", "0"], ["--threads"]),
+        (["--speed"], ["--speed"]),
+    ],
+)
+@pytest.mark.parametrize("command", ["run", "restart"])
+def test_wrong_settings(command, arguments, words, config, done, tmp_path):
+    source = config if command == "run" else done[0]
+    before = hashes(done[0])
+    result = sph_(command, source, "-o", tmp_path / "new", *arguments)
+    assert_told(result, 2, *words)
+    assert not (tmp_path / "new").exists()
+    assert hashes(done[0]) == before
+
+
+def test_not_toml(tmp_path):
+    path = tmp_path / "bad.toml"
+    path.write_text("[problem]\nname = \n")
+    assert_told(sph_("run", path), 2, f"{path}, line 2", "not valid TOML")
+
+
+def test_new_of_an_unknown_problem():
+    assert_told(sph_("new", "shock_tub"), 2, 'no problem "shock_tub"', "mean shock_tube?")
+
+
+def test_a_restart_that_cannot_be(done):
+    result = sph_("restart", done[0], "--set", "problem.n=61")
+    assert_told(result, 2, "problem.n cannot be changed")
+
+
+# --- exit code 3 ------------------------------------------------------------------------------
+
+
+def test_numerical_failure(config, tmp_path):
+    run = tmp_path / "run"
+    result = sph_(
+        "run", config, "-o", run, "--set", "physics.C=50.0", "--set", "problem.left.pressure=1e3"
+    )
+    first = run / "checkpoints" / "checkpoint_000000.h5"
+    assert_told(result, 3, "of particle ", "Try: ", f"`sph restart {first} --set ")
+    assert json.loads((run / "summary.json").read_text())["status"] == "failed"
+    result = sph_("restart", first, "--set", "physics.C=0.15", "--set", "time.end=0.01")
+    assert result.exit_code == 0, result.output
+
+
+# --- exit code 4 ------------------------------------------------------------------------------
+
+
+def test_missing_files(tmp_path):
+    assert_told(sph_("run", tmp_path / "no.toml"), 4, "no.toml: there is no such file")
+    assert_told(sph_("run", tmp_path), 4, "a directory")
+    assert_told(sph_("restart", tmp_path / "no"), 4, f"{tmp_path / 'no'} does not exist")
+    assert_told(sph_("restart", tmp_path), 4, "is not a run directory")
+
+
+def test_what_is_no_good_checkpoint(done, tmp_path):
+    good = (done[0] / "checkpoints" / "checkpoint_000002.h5").read_bytes()
+    bad = tmp_path / "bad.h5"
+    bad.write_text("not HDF5")
+    assert_told(sph_("restart", bad), 4, "is not an HDF5 file")
+    bad.write_bytes(good[: len(good) // 2])
+    assert_told(sph_("restart", bad), 4, "is truncated or damaged")
+    with h5py.File(tmp_path / "other.h5", "w") as file:
+        file["x"] = 1.0
+    assert_told(sph_("restart", tmp_path / "other.h5"), 4, "not a checkpoint of sph")
+    bad.write_bytes(good)
+    with h5py.File(bad, "a") as file:
+        file["Checkpoint"].attrs["format_version"] = 99
+    assert_told(sph_("restart", bad), 4, "a newer format (99)", "Try: a newer sph")
+    bad.write_bytes(good)
+    assert_told(sph_("restart", bad), 4, "not in a run directory", "-o DIR")
+
+
+@pytest.mark.parametrize("command", ["run", "restart"])
+def test_a_place_that_cannot_be_written(command, config, done, tmp_path):
+    source = config if command == "run" else done[0]
+    (tmp_path / "file").touch()
+    for below in ("", "run"):
+        result = sph_(command, source, "-o", tmp_path / "file" / below)
+        assert_told(result, 4, "file", "Try: ")
+
+
+def test_a_directory_of_something_else(config, tmp_path):
+    assert_told(sph_("run", config, "-o", tmp_path, "--force"), 4, "is not a run directory")
+    assert config.exists()
+
+
+# --- signals ----------------------------------------------------------------------------------
+
+
+def test_an_interrupt_while_loading_is_no_traceback(config, monkeypatch):
+    def interrupted(*_):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(configuration, "load", interrupted)
+    result = sph_("run", config)
+    assert_told(result, 1, "Aborted!")
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM], ids=lambda one: one.name)
+def test_a_signal_in_a_run_leaves_a_checkpoint(number, config, tmp_path):
+    process = started(tmp_path, "run", config, "-o", "run", "--set", "time.end=1e6",
+                      "--set", "output.interval=1e5")  # fmt: skip
+    read_until(process.stderr, "wrote checkpoint_000000.h5")
+    process.send_signal(number)
+    code, out, err = finished(process)
+    assert (code, out) == (75, "")
+    assert "stopped by " + {2: "Ctrl-C", 15: "SIGTERM"}[number] in err
+    assert "`sph restart run` goes on from there" in err
+    assert "Traceback" not in err
+    summary = json.loads((tmp_path / "run" / "summary.json").read_text())
+    assert summary["status"] == "stopped"
+    last = max(hashes(tmp_path / "run"))
+    assert summary["steps"] == last
+    end = f"time.end={summary['time'] + 0.01}"
+    assert sph_("restart", tmp_path / "run", "--set", end).exit_code == 0
+    assert max(hashes(tmp_path / "run")) > last
+
+
+def test_a_second_interrupt_ends_at_once(config, tmp_path, monkeypatch):
+    class Impatient(progress.Lines):
+        def step(self, simulation):
+            signal.raise_signal(signal.SIGINT)
+            signal.raise_signal(signal.SIGINT)
+
+    monkeypatch.setattr(progress, "suited", Impatient)
+    handler = signal.signal(signal.SIGINT, signal.default_int_handler)
+    try:
+        result = sph_("run", config, "-o", tmp_path / "run")
+    finally:
+        signal.signal(signal.SIGINT, handler)
+    assert_told(result, 1, "wrote checkpoint_000000.h5", "Aborted!")
+
+
+def test_a_stop_while_compiling_and_a_restart_equal_a_run_without(config, tmp_path):
+    """Also compiled code is the same whether it was just compiled or comes from the cache."""
+    cache = {"NUMBA_CACHE_DIR": str(tmp_path / "cache")}
+    process = started(tmp_path, "run", config, "-o", "stopped", **cache)
+    read_until(process.stderr, "preparing")
+    process.send_signal(signal.SIGTERM)
+    code, _, err = finished(process)
+    assert code == 75, err
+    assert "at t = 0, step 0" in err
+    code, _, err = finished(started(tmp_path, "restart", "stopped", **cache))
+    assert code == 0, err
+    code, out, err = finished(started(tmp_path, "run", config, "-o", "other", **cache))
+    assert code == 0, err
+    assert "of which 0 s compiling" in out  # else this shows nothing
+    found = hashes(tmp_path / "stopped")
+    assert len(found) == 5
+    assert found == hashes(tmp_path / "other")
+
+
+def test_a_killed_run_goes_on_from_its_last_good_checkpoint(config, tmp_path):
+    process = started(tmp_path, "run", config, "-o", "run", "--set", "time.end=1e6")
+    read_until(process.stderr, "wrote checkpoint_000002.h5")
+    process.kill()
+    finished(process)
+    run = tmp_path / "run"
+    assert not (run / "summary.json").exists()
+    with h5py.File(RunDirectory(run).latest()) as file:
+        end = round(float(file["Checkpoint/time"][()]) + 0.1, 2)
+    result = sph_("restart", run, "--set", f"time.end={end}")
+    assert result.exit_code == 0, result.output
+    assert not list(run.rglob("*.partial"))
+    result = sph_("run", config, "-o", tmp_path / "whole", "--set", f"time.end={end}")
+    assert result.exit_code == 0
+    assert hashes(run) == hashes(tmp_path / "whole")
+    steps = [int(row.split(",")[0]) for row in (run / "history.csv").read_text().split()[1:]]
+    assert steps == list(range(max(hashes(run)) + 1))

@@ -1,0 +1,78 @@
+"""CPU seconds by phase, with compilation apart."""
+
+import time
+from contextlib import closing
+
+import pytest
+from numba import njit
+
+from sph.clock import Clock
+
+
+def burn(seconds):
+    """Spend CPU time."""
+    begin = time.process_time()
+    while time.process_time() - begin < seconds:
+        pass
+
+
+@pytest.fixture
+def clock():
+    with closing(Clock()) as made:
+        yield made
+
+
+def test_a_phase_adds_up_and_waiting_costs_nothing(clock):
+    for _ in range(2):
+        with clock.phase("work"):
+            burn(0.02)
+            time.sleep(0.05)
+    with clock.phase("other"):
+        burn(0.01)
+    assert set(clock.seconds) == {"work", "other"}
+    # whatever else the test's machine does is not counted, but for the burning's own last turn
+    assert 0.04 <= clock.seconds["work"] < 0.09
+    assert clock.cpu >= sum(clock.seconds.values())
+    assert clock.wall >= 0.14
+
+
+def test_compilation_is_no_part_of_a_phase(clock):
+    @njit
+    def outer(x):
+        return inner(x) + 1.0
+
+    @njit
+    def inner(x):
+        return x * x
+
+    with clock.phase("work"):
+        outer(2.0)
+        burn(0.02)
+    assert clock.compiling > 0.01  # two functions, the inner one while the outer one is compiled
+    assert 0.02 <= clock.seconds["work"] < 0.02 + 0.5 * clock.compiling
+    assert clock.cpu >= clock.compiling + clock.seconds["work"]
+
+
+def test_a_phase_that_fails_is_counted(clock):
+    def fail():
+        with clock.phase("work"):
+            burn(0.01)
+            raise ZeroDivisionError
+
+    with pytest.raises(ZeroDivisionError):
+        fail()
+    assert clock.seconds["work"] >= 0.01
+
+
+def test_a_closed_clock_hears_nothing(clock):
+    Clock().close()
+    other = Clock()
+    other.close()
+
+    @njit
+    def compiled(x):
+        return x - 1.0
+
+    compiled(2.0)
+    assert other.compiling == 0.0
+    assert clock.compiling > 0.0

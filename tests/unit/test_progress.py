@@ -1,0 +1,155 @@
+"""Progress: lines in a log, a bar on a terminal, and no bar where it could not be seen."""
+
+import io
+import os
+import pty
+import re
+import signal
+import struct
+import subprocess
+import sys
+import termios
+import warnings
+from fcntl import ioctl
+from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
+
+import sph
+from sph import progress
+
+ROOT = Path(sph.__file__).parents[1]
+TUBE = """\
+[problem]
+name = "shock_tube"
+n = 400
+[time]
+end = 0.4
+[output]
+interval = 0.2
+[run]
+threads = 1
+"""
+
+
+class Hours:
+    """A clock that the test turns."""
+
+    now = 100.0
+
+    def monotonic(self):
+        return self.now
+
+
+@pytest.fixture
+def clock(monkeypatch):
+    hours = Hours()
+    monkeypatch.setattr(progress, "time", hours)
+    return hours
+
+
+def at(time, step=1, dt=0.01):
+    return SimpleNamespace(time=time, step=step, limit=SimpleNamespace(dt=dt))
+
+
+def test_lines_come_seconds_apart_with_the_time_left(clock, capsys):
+    lines = progress.Lines()
+    lines.start(0.0, 1.0)
+    clock.now += 40.0  # the first step compiles
+    lines.step(at(0.01))
+    first = capsys.readouterr().err
+    assert first == "step 1, t = 0.01 of 1, dt = 0.01\n"  # and says nothing of the pace
+    clock.now += 9.9
+    lines.step(at(0.1, step=10))
+    assert capsys.readouterr().err == ""
+    clock.now += 0.1
+    lines.step(at(0.11, step=11))
+    # 0.1 in the 10 s since the first step: 0.89 takes 89 s
+    assert capsys.readouterr().err == "step 11, t = 0.11 of 1, dt = 0.01, about 89 s left\n"
+    lines.wrote(Path("a/checkpoint_000001.h5"), at(0.5))
+    assert capsys.readouterr() == ("", "t = 0.5: wrote checkpoint_000001.h5\n")
+    lines.close()
+
+
+def test_steps_too_small_to_be_seen_divide_nothing_by_zero(clock, capsys):
+    lines = progress.Lines()
+    lines.start(1.0, 2.0)
+    for step in range(3):
+        clock.now += 20.0
+        lines.step(at(1.0, step, dt=1e-300))
+    assert "left" not in capsys.readouterr().err
+
+
+def test_time_left_of_a_restart_counts_from_where_it_began(clock, capsys):
+    lines = progress.Lines()
+    lines.start(5.0, 6.0)
+    lines.step(at(5.0))
+    clock.now += 10.0
+    lines.step(at(5.5))
+    assert "about 10 s left" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("begin", [0.0, 0.1])
+def test_bar_reaches_its_end_without_warnings(begin, monkeypatch):
+    stream = io.StringIO()
+    monkeypatch.setattr(sys, "stderr", stream)
+    bar = progress.Bar()
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")  # tqdm warns of a bar that passes its end
+        bar.start(begin, 0.7)
+        bar.step(at(begin, dt=0.0))
+        for step in range(1, 8):
+            bar.step(at(begin + step * (0.7 - begin) / 7, step))
+            bar._bar.refresh()
+        bar.step(at(0.7, 8))
+        bar._bar.refresh()
+        bar.close()
+    assert "100%" in stream.getvalue()
+    assert re.search(r"t = 0\.7 of 0\.7, step 8, dt 0\.01 \[00:0\d, .* left\]", stream.getvalue())
+
+
+def test_bar_that_never_started_closes():
+    progress.Bar().close()
+
+
+def on_terminal(monkeypatch, columns):
+    monkeypatch.setattr(sys, "stderr", SimpleNamespace(isatty=lambda: True, fileno=lambda: 2))
+    monkeypatch.setattr(os, "get_terminal_size", lambda descriptor: os.terminal_size((columns, 24)))
+
+
+def test_which_is_suited(monkeypatch):
+    assert type(progress.suited()) is progress.Lines  # the tests' own stderr is no terminal
+    on_terminal(monkeypatch, 80)
+    assert type(progress.suited()) is progress.Bar
+    on_terminal(monkeypatch, 0)
+    assert type(progress.suited()) is progress.Lines
+
+
+def test_a_run_on_a_terminal_shows_a_bar_and_keeps_stdout_for_the_summary(tmp_path):
+    (tmp_path / "tube.toml").write_text(TUBE)
+    terminal, its_end = pty.openpty()
+    ioctl(its_end, termios.TIOCSWINSZ, struct.pack("HHHH", 24, 100, 0, 0))
+    process = subprocess.Popen(
+        [sys.executable, "-m", "sph.cli", "run", "tube.toml", "-o", "run"],
+        cwd=tmp_path,
+        env={**os.environ, "PYTHONPATH": f"{ROOT}{os.pathsep}{os.environ.get('PYTHONPATH', '')}"},
+        stdout=subprocess.PIPE,
+        stderr=its_end,
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
+    )
+    os.close(its_end)
+    shown = b""
+    try:
+        while chunk := os.read(terminal, 65536):
+            shown += chunk
+    except OSError:  # how Linux tells that the other end has closed
+        pass
+    os.close(terminal)
+    out = process.communicate(timeout=60)[0].decode()
+    assert process.returncode == 0
+    assert re.search(r" 0%\|.*left\]", shown.decode())
+    assert re.search(r"\r +\d+%\|.*\| t = 0\.\d+ of 0\.4, step \d+, dt .*left\]", shown.decode())
+    assert "checkpoint" not in shown.decode()
+    assert out.startswith("shock_tube: ")
+    assert "%|" not in out

@@ -1,0 +1,629 @@
+"""Runs as a user has them: outputs, stops, failures, and restarts that continue bit for bit."""
+
+import csv
+import itertools
+import json
+import shutil
+import signal
+from types import SimpleNamespace
+
+import h5py
+import numpy as np
+import pytest
+
+from sph import config as configuration
+from sph import runner
+from sph.analysis.summary import in_words
+from sph.errors import ConfigError, FileError, NumericalError, Stopped
+from sph.output import checkpoint as checkpoints
+from sph.output.run_directory import RunDirectory
+from sph.runner import output_times
+
+TUBE = """
+[problem]
+name = "shock_tube"
+n = 60
+boundary = "mirror"
+[time]
+end = 0.2
+[output]
+interval = 0.05
+[run]
+threads = 1
+"""
+# 525 blocks: enough for a pass to be shared by two threads
+SHEAR = """
+[problem]
+name = "kelvin_helmholtz"
+n = 4400
+boundary = "periodic"
+[physics]
+alpha = { min = 0.1, max = 2.0 }
+[time]
+end = 0.024
+[output]
+interval = 0.006
+[run]
+threads = 1
+"""
+CLOUD = """
+[problem]
+name = "uniform"
+dimension = 3
+n = 343
+noise = 0.2
+boundary = "open"
+[physics]
+C = 0.02
+balsara = false
+density_passes = 3
+[time]
+end = 0.1
+[output]
+interval = 0.025
+[run]
+threads = 1
+"""
+SCENES = {"1-D mirror": TUBE, "2-D periodic, switched alpha": SHEAR, "3-D open": CLOUD}
+
+
+class Watch:
+    """Progress that keeps the notes and calls back, e.g. `at_step(simulation)` after each step."""
+
+    def __init__(self, at_step=None, at_note=None, at_start=None, at_checkpoint=None):
+        self.at_step, self.at_note = at_step, at_note
+        self.at_start, self.at_checkpoint = at_start, at_checkpoint
+        self.notes = []
+
+    def note(self, text):
+        self.notes.append(text)
+        if self.at_note:
+            self.at_note()
+
+    def start(self, begin, end):
+        if self.at_start:
+            self.at_start()
+
+    def step(self, simulation):
+        if self.at_step:
+            self.at_step(simulation)
+
+    def wrote(self, path, simulation):
+        if self.at_checkpoint:
+            self.at_checkpoint(path)
+
+    def close(self): ...
+
+
+def interrupt(*_):
+    signal.raise_signal(signal.SIGINT)
+
+
+def start(text, directory, progress=None):
+    """A new run in `directory`: the run directory."""
+    target = RunDirectory.create(directory)
+    runner.run(configuration.from_text(text), target, progress or Watch())
+    return target
+
+
+def go_on(source, *overrides, into=None, progress=None):
+    return runner.restart(source, overrides, into, progress or Watch())[1]
+
+
+def copy(run, directory):
+    return RunDirectory(shutil.copytree(run.path, directory))
+
+
+def state(path):
+    """Every dataset of /Checkpoint."""
+    with h5py.File(path) as file:
+        return {name: dataset[()] for name, dataset in file["Checkpoint"].items()}
+
+
+def differences(one, other):
+    """Names of the datasets of two checkpoints that are not equal bit for bit."""
+    one, other = state(one), state(other)
+    assert len(one) >= 16  # the 10 arrays every scene has, 3 of the lists, time, step, next_step
+    hashes = checkpoints.state_hash
+    return [
+        name
+        for name in sorted(set(one) | set(other))
+        if name not in one
+        or name not in other
+        or hashes({name: one[name]}) != hashes({name: other[name]})
+    ]
+
+
+def by_step(run):
+    return {int(state(path)["step"]): path for path in run.checkpoints()}
+
+
+def rows(run):
+    """The history without its seconds, as text: floats there keep every bit."""
+    with run.history.open(newline="") as file:
+        return [
+            {name: value for name, value in row.items() if not name.endswith("_seconds")}
+            for row in csv.DictReader(file)
+        ]
+
+
+def assert_same_from(step, run, reference):
+    """All checkpoints after `step` and the whole history are those of the uninterrupted run."""
+    found, expected = by_step(run), by_step(reference)
+    later = [one for one in expected if one > step]
+    assert later
+    assert {one: differences(found[one], expected[one]) for one in later} == {
+        one: [] for one in later
+    }
+    assert rows(run) == rows(reference)
+
+
+def numbers(run):
+    return [path.name for path in run.checkpoints()]
+
+
+def steps_after(run, time):
+    return sum(float(row["t"]) > time for row in rows(run))
+
+
+def files(directory):
+    return {path: path.read_bytes() for path in sorted(directory.rglob("*")) if path.is_file()}
+
+
+@pytest.fixture(scope="module", params=SCENES)
+def uninterrupted(request, tmp_path_factory):
+    """A scene's text and its run to the end on one thread."""
+    text = SCENES[request.param]
+    return SimpleNamespace(text=text, run=start(text, tmp_path_factory.mktemp("scene") / "run"))
+
+
+@pytest.fixture(scope="module")
+def tube(tmp_path_factory):
+    """The run of TUBE, for tests that only look or copy it."""
+    return start(TUBE, tmp_path_factory.mktemp("tube") / "run")
+
+
+# --- outputs ----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("end", "interval", "times"),
+    [
+        (0.2, 0.05, [0.05, 0.1, 0.15, 0.2]),
+        (0.3, 0.1, [0.1, 0.2, 0.3]),  # 3 x 0.1 is not 0.3 in binary
+        (0.7, 0.1, [0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7]),
+        (0.25, 0.1, [0.1, 0.2, 0.25]),
+        (0.2, 1.0, [0.2]),
+        (0.2, 1e12, [0.2]),
+        (0.2, 0.2, [0.2]),
+        (1 / 3, 1 / 9, [0.111111111111111, 0.222222222222222, 1 / 3]),
+        (3e-9, 1e-9, [1e-9, 2e-9, 3e-9]),
+    ],
+)
+def test_output_times(end, interval, times):
+    assert list(output_times(end, interval)) == times
+
+
+@pytest.mark.parametrize(
+    ("after", "times"),
+    [
+        (0.0, [0.1, 0.2, 0.25]),
+        (0.1, [0.2, 0.25]),
+        (0.1 + 1e-15, [0.2, 0.25]),
+        (0.1 - 1e-15, [0.2, 0.25]),
+        (0.17, [0.2, 0.25]),
+        (0.25, []),
+    ],
+)
+def test_output_times_that_are_left(after, times):
+    assert list(output_times(0.25, 0.1, after)) == times
+
+
+def test_times_of_an_earlier_end_are_those_of_a_later_one():
+    assert list(output_times(0.3, 0.1)) == list(output_times(0.6, 0.1))[:3]
+
+
+def test_checkpoints_are_at_the_output_times_and_history_has_every_step(uninterrupted):
+    run, config = uninterrupted.run, configuration.from_text(uninterrupted.text)
+    times = [0.0, *output_times(config.time.end, config.output.interval)]
+    assert [float(state(path)["time"]) for path in run.checkpoints()] == times
+    assert numbers(run) == [f"checkpoint_{k:06d}.h5" for k in range(5)]
+    history = rows(run)
+    assert [int(row["step"]) for row in history] == list(range(max(by_step(run)) + 1))
+    assert float(history[0]["t"]) == 0.0
+    assert float(history[-1]["t"]) == config.time.end
+    assert {row["limiter"] for row in history} <= {"signal_speed", "energy"}
+    assert 1 <= int(history[0]["limiter_particle"]) <= state(run.checkpoint_path(0))["id"].size
+    # the allowed step is taken, but where it is cut to land on an output
+    taken = np.diff([float(row["t"]) for row in history])
+    allowed = np.array([float(row["dt"]) for row in history[:-1]])
+    # a step may be stretched by a billionth to land; t itself is rounded to 2e-16
+    assert np.all(taken <= allowed * (1 + 2e-9))
+    assert np.sum(taken < allowed * (1 - 1e-9)) <= 4
+
+
+def test_history_agrees_with_the_checkpoint(tube):
+    last, row = state(tube.checkpoint_path(4)), rows(tube)[-1]
+    kinetic = 0.5 * np.sum(last["mass"] * last["velocity"] ** 2)
+    # sums of 60 numbers in another order
+    assert float(row["kinetic_energy"]) == pytest.approx(kinetic, rel=1e-13)
+    internal = np.sum(last["mass"] * last["internal_energy"])
+    assert float(row["internal_energy"]) == pytest.approx(internal, rel=1e-13)
+    assert float(row["momentum_x"]) == pytest.approx(np.sum(last["mass"] * last["velocity"]))
+    assert float(row["max_density"]) == last["density"].max()
+    assert float(row["dt"]) == last["next_step"]
+
+
+# --- restarts that equal the uninterrupted run ------------------------------------------------
+
+
+@pytest.mark.parametrize("number", [0, 1, 3])
+def test_restart_continues_bit_for_bit_on_two_threads(uninterrupted, number, tmp_path):
+    run = copy(uninterrupted.run, tmp_path / "run")
+    path = run.checkpoint_path(number)
+    go_on(path, "run.threads=2")
+    assert numbers(run) == numbers(uninterrupted.run)
+    assert_same_from(int(state(path)["step"]), run, uninterrupted.run)
+
+
+def test_a_later_end_continues_bit_for_bit(uninterrupted, tmp_path):
+    config = configuration.from_text(uninterrupted.text)
+    half = f"time.end={config.time.end / 2}"
+    run = RunDirectory.create(tmp_path / "run")
+    runner.run(config.override([half, "run.threads=2"]), run, Watch())
+    assert numbers(run) == [f"checkpoint_{k:06d}.h5" for k in range(3)]
+    go_on(run.path, f"time.end={config.time.end}", "run.threads=1")
+    assert numbers(run) == numbers(uninterrupted.run)
+    assert_same_from(0, run, uninterrupted.run)
+
+
+def test_a_stop_between_outputs_and_builds_of_lists_continues_bit_for_bit(uninterrupted, tmp_path):
+    run = RunDirectory.create(tmp_path / "run")
+
+    def in_the_life_of_lists(simulation):
+        origin = simulation.search.origin.position
+        used = not np.array_equal(origin, simulation.particles.position)
+        between = simulation.time not in output_times(
+            simulation.scene.config.time.end, simulation.scene.config.output.interval
+        )
+        if used and between and simulation.step >= 3 and not stopped:
+            stopped.append(simulation.step)
+            interrupt()
+
+    stopped = []
+    with pytest.raises(Stopped) as caught:
+        runner.run(configuration.from_text(uninterrupted.text), run, Watch(in_the_life_of_lists))
+    assert caught.value.exit_code == 75
+    assert f"sph restart {run.path}" in str(caught.value)
+    assert json.loads(run.summary.read_text())["status"] == "stopped"
+    last = state(run.checkpoints()[-1])
+    assert [int(last["step"])] == stopped
+    assert not np.array_equal(last["list_position"], last["position"])
+    go_on(run.path, "run.threads=2")
+    assert_same_from(stopped[0], run, uninterrupted.run)
+    assert len(run.checkpoints()) == len(uninterrupted.run.checkpoints()) + 1
+
+
+def test_the_runs_of_the_tests_differ_from_step_to_step(uninterrupted):
+    """What makes the comparisons above mean something."""
+    paths = uninterrupted.run.checkpoints()
+    same = {"id", "mass", "alpha", "alpha_rate", "list_skin"}
+    for one, other in itertools.pairwise(paths):
+        assert set(state(one)) - same - set(differences(one, other)) == set()
+
+
+def test_costs_add_up_over_sessions(tube, tmp_path):
+    run = copy(tube, tmp_path / "run")
+    go_on(run.checkpoint_path(2))
+    with run.history.open(newline="") as file:
+        found = [(float(r["wall_seconds"]), float(r["cpu_seconds"])) for r in csv.DictReader(file)]
+    assert np.all(np.diff(found, axis=0) >= 0)
+    cost = json.loads(run.summary.read_text())["cost"]
+    assert (cost["wall_seconds"], cost["cpu_seconds"]) == found[-1]
+    step = int(state(run.checkpoint_path(2))["step"])
+    assert cost["session"]["steps"] == len(found) - 1 - step
+    assert cost["wall_seconds"] > found[step][0] > 0.0
+
+
+# --- where a restart goes on ------------------------------------------------------------------
+
+
+def test_later_checkpoints_are_replaced(tube, tmp_path):
+    run = copy(tube, tmp_path / "run")
+    go_on(run.checkpoint_path(1), "time.end=0.12", "physics.alpha=2.0")
+    assert numbers(run) == [f"checkpoint_{k:06d}.h5" for k in range(4)]
+    assert [float(state(path)["time"]) for path in run.checkpoints()] == [0.0, 0.05, 0.1, 0.12]
+    assert differences(run.checkpoint_path(1), tube.checkpoint_path(1)) == []
+    assert "velocity" in differences(run.checkpoint_path(2), tube.checkpoint_path(2))
+    resolved = configuration.load(run.config)
+    assert (resolved.time.end, resolved.physics.alpha) == (0.12, 2.0)
+    assert checkpoints.read(run.checkpoint_path(3)).config.physics.alpha == 2.0
+    assert "restarted at step" in checkpoints.read(run.checkpoint_path(3)).lineage[-1]
+
+
+def test_into_a_new_directory(tube, tmp_path):
+    before = files(tube.path)
+    run = go_on(tube.checkpoint_path(2), into=tmp_path / "new" / "run")
+    assert run.path == tmp_path / "new" / "run"
+    assert files(tube.path) == before
+    assert numbers(run) == numbers(tube)
+    assert [differences(a, b) for a, b in zip(run.checkpoints(), tube.checkpoints(), strict=True)]
+    assert_same_from(-1, run, tube)
+    assert json.loads(run.summary.read_text())["status"] == "done"
+    go_on(run.path, "time.end=0.21")  # and that is a run directory like any other
+
+
+def test_a_lone_checkpoint(tube, tmp_path):
+    lone = shutil.copy(tube.checkpoint_path(2), tmp_path / "lone.h5")
+    with pytest.raises(FileError, match=r"not in a run directory.*\n.*-o DIR"):
+        go_on(tmp_path / "lone.h5")
+    run = go_on(tmp_path / "lone.h5", into=tmp_path / "run")
+    assert numbers(run) == [f"checkpoint_{k:06d}.h5" for k in range(3)]
+    assert differences(run.checkpoint_path(0), lone) == []
+    for number in (1, 2):
+        assert differences(run.checkpoint_path(number), tube.checkpoint_path(number + 2)) == []
+    step = int(state(lone)["step"])
+    first, *others = rows(run)
+    assert others == rows(tube)[step + 1 :]
+    # the limiter of the first step is not in a checkpoint
+    assert (first["limiter"], first["limiter_particle"]) == ("checkpoint", "0")
+    unknown = {"limiter": None, "limiter_particle": None}
+    assert first | unknown == rows(tube)[step] | unknown
+
+
+def test_a_run_at_its_end_stays_as_it_is(tube, tmp_path):
+    run = copy(tube, tmp_path / "run")
+    run.summary.unlink()  # as after a kill between the last checkpoint and the summary
+    go_on(run.path)
+    assert numbers(run) == numbers(tube)
+    assert rows(run) == rows(tube)
+    assert json.loads(run.summary.read_text())["status"] == "done"
+    alone = go_on(shutil.copy(tube.checkpoint_path(4), tmp_path / "a.h5"), into=tmp_path / "b")
+    assert numbers(alone) == ["checkpoint_000000.h5"]
+    assert len(rows(alone)) == 1
+
+
+def test_a_damaged_last_checkpoint_is_passed_over_and_named(tube, tmp_path):
+    run = copy(tube, tmp_path / "run")
+    whole = run.checkpoint_path(4).read_bytes()
+    run.checkpoint_path(4).write_bytes(whole[: len(whole) // 2])
+    progress = Watch()
+    go_on(run.path, progress=progress)
+    assert [note for note in progress.notes if "checkpoint_000004.h5 cannot be read" in note]
+    assert [note for note in progress.notes if "going on from checkpoint_000003.h5" in note]
+    assert_same_from(-1, run, tube)
+
+
+def test_nothing_is_said_of_damage_where_there_is_none(tube, tmp_path):
+    progress = Watch()
+    run = copy(tube, tmp_path / "run")
+    go_on(run.path, progress=progress)
+    go_on(run.checkpoint_path(2), progress=progress)
+    assert not [note for note in progress.notes if "cannot be read" in note]
+
+
+def test_an_old_summary_does_not_outlive_a_restart(tube, tmp_path):
+    run = copy(tube, tmp_path / "run")
+    seen = []
+    watch = Watch(at_step=lambda simulation: seen.append(run.summary.exists()))
+    go_on(run.path, "time.end=0.21", progress=watch)
+    assert seen
+    assert not any(seen)
+    assert json.loads(run.summary.read_text())["time"] == 0.21
+
+
+@pytest.mark.parametrize(
+    ("overrides", "message"),
+    [
+        (["problem.n=61"], "problem.n cannot be changed"),
+        (["problem.dimension=2"], "problem.dimension cannot"),
+        (["problem.left={density=2.0}"], "problem.left cannot"),
+        (["physics.alpha={min=0.1,max=2.0}"], "physics.alpha: expected one number"),
+        (["time.end=0.1"], "time.end = 0.1: expected a later time than the checkpoint's, 0.2"),
+        (["physics.aplha=2"], "alpha"),
+        (["problem.n=61", "time.end=0.1"], r"(?s)problem\.n.*time\.end"),
+    ],
+)
+def test_what_a_restart_cannot_change_is_refused_before_anything_is(
+    tube, tmp_path, overrides, message
+):
+    before = files(tube.path)
+    for into in (None, tmp_path / "new"):
+        with pytest.raises(ConfigError, match=message):
+            go_on(tube.path, *overrides, into=into)
+    assert files(tube.path) == before
+    assert not (tmp_path / "new").exists()
+
+
+# --- stops ------------------------------------------------------------------------------------
+
+
+def test_a_stop_at_an_output_writes_no_second_checkpoint(tmp_path):
+    watch = Watch(at_checkpoint=lambda path: interrupt() if "000001" in path.name else None)
+    with pytest.raises(Stopped, match="checkpoint_000001"):
+        start(TUBE, tmp_path / "run", watch)
+    assert numbers(RunDirectory(tmp_path / "run"))[-1] == "checkpoint_000001.h5"
+
+
+def test_a_run_leaves_the_handlers_of_signals_as_they_were(tmp_path):
+    before = signal.getsignal(signal.SIGINT), signal.getsignal(signal.SIGTERM)
+    start(TUBE.replace("end = 0.2", "end = 0.002"), tmp_path / "run")
+    assert (signal.getsignal(signal.SIGINT), signal.getsignal(signal.SIGTERM)) == before
+
+
+def test_a_stop_before_the_first_step_keeps_the_initial_state(tmp_path, tube):
+    with pytest.raises(Stopped, match="checkpoint_000000"):
+        start(TUBE, tmp_path / "run", Watch(at_note=interrupt))
+    run = RunDirectory(tmp_path / "run")
+    assert numbers(run) == ["checkpoint_000000.h5"]
+    go_on(run.path)
+    assert_same_from(-1, run, tube)
+
+
+def test_a_stop_before_the_first_step_of_a_restart(tube, tmp_path):
+    run = copy(tube, tmp_path / "run")
+    run.checkpoint_path(4).write_bytes(b"")
+    with pytest.raises(Stopped, match="checkpoint_000003"):
+        go_on(run.path, progress=Watch(at_start=interrupt))
+    assert numbers(run) == numbers(tube)[:-1]
+    go_on(run.path)
+    assert_same_from(-1, run, tube)
+
+
+def test_a_second_signal_acts_at_once_and_handlers_come_back(tmp_path):
+    handler = signal.signal(signal.SIGINT, signal.default_int_handler)
+    before = signal.getsignal(signal.SIGINT), signal.getsignal(signal.SIGTERM)
+
+    def twice(simulation):
+        interrupt()
+        interrupt()
+
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            start(TUBE, tmp_path / "run", Watch(at_step=twice))
+        assert (signal.getsignal(signal.SIGINT), signal.getsignal(signal.SIGTERM)) == before
+    finally:
+        signal.signal(signal.SIGINT, handler)
+    assert len(rows(RunDirectory(tmp_path / "run"))) == 2  # what was reached is on disk
+
+
+# --- failures ---------------------------------------------------------------------------------
+
+STRONG = """
+[problem]
+name = "shock_tube"
+n = 100
+domain = [-1.0, 1.0]
+boundary = "periodic"
+left = { density = 1.0, velocity = 0.0, pressure = 1000.0 }
+right = { density = 1.0, velocity = 0.0, pressure = 0.01 }
+[physics]
+alpha = 2.0
+C = 50.0
+[time]
+end = 0.012
+[output]
+interval = 0.006
+"""
+
+
+def test_a_numerical_failure_names_the_particle_and_the_way_on(tmp_path, recwarn):
+    run = RunDirectory.create(tmp_path / "run")
+    with pytest.raises(NumericalError) as caught:
+        runner.run(configuration.from_text(STRONG), run, Watch())
+    text = str(caught.value)
+    assert caught.value.exit_code == 3
+    for words in ("of particle ", "Try: a smaller physics.C", str(run.checkpoint_path(0))):
+        assert words in text
+    assert f"sph restart {run.checkpoint_path(0)} --set" in text
+    summary = json.loads(run.summary.read_text())
+    assert (summary["status"], summary["errors"]) == ("failed", None)
+    assert "of particle " in summary["reason"]
+    assert len(rows(run)) == 1
+    assert [str(warning.message) for warning in recwarn] == []
+    go_on(run.checkpoint_path(0), "physics.C=0.15")
+    assert json.loads(run.summary.read_text())["status"] == "done"
+    assert numbers(run) == [f"checkpoint_{k:06d}.h5" for k in range(3)]
+
+
+def test_the_first_step_of_a_restart_obeys_what_was_changed(tube, tmp_path):
+    step = float(rows(tube)[-1]["dt"])
+    for changed, expected in [("physics.C=0.075", step / 2), ("physics.alpha=2.0", step)]:
+        run = copy(tube, tmp_path / changed)
+        go_on(run.path, "time.end=0.3", changed)
+        first, then = rows(run)[-1 - steps_after(run, 0.2) :][:2]
+        assert float(first["t"]) == 0.2
+        # the difference of two times near 0.2 is good to 3e-17
+        assert float(then["t"]) - 0.2 == pytest.approx(expected, abs=1e-16)
+
+
+def test_the_energy_limit_holds_from_the_first_step_of_a_restart(tmp_path):
+    free = STRONG.replace("C = 50.0", "C = 0.15\nenergy_limit = false")
+    run = start(free.replace("end = 0.012", "end = 0.0005"), tmp_path / "run")
+    last = state(run.checkpoints()[-1])
+    allowed = 0.15 * np.min(last["internal_energy"] / np.abs(last["energy_rate"]))
+    assert allowed < 0.9 * last["next_step"]  # else this shows nothing
+    go_on(run.path, "time.end=0.012", "physics.energy_limit=true")
+    first, then = (float(row["t"]) for row in rows(run)[-1 - steps_after(run, 0.0005) :][:2])
+    assert then - first == pytest.approx(allowed, rel=1e-9)
+
+
+def test_a_failure_of_the_first_evaluation_names_no_checkpoint(tmp_path):
+    few = TUBE.replace("mirror", "periodic").replace("n = 60", "n = 18")
+    few += "[physics]\neta = 30.0\n"
+    run = RunDirectory.create(tmp_path / "run")
+    with pytest.raises(NumericalError, match=r"particle .*support.*\nTry: ") as caught:
+        runner.run(configuration.from_text(few), run, Watch())
+    assert "checkpoint" not in str(caught.value)
+    start(TUBE + "\n[physics]\nC = 0.3\n", tmp_path / "run")  # the place is free
+
+
+# --- the summary ------------------------------------------------------------------------------
+
+
+def test_summary(uninterrupted):
+    run, config = uninterrupted.run, configuration.from_text(uninterrupted.text)
+    summary = json.loads(run.summary.read_text())
+    assert summary["status"] == "done"
+    assert summary["problem"] == config.problem.name
+    assert summary["dimension"] == config.problem.dimension
+    assert summary["time"] == config.time.end
+    assert summary["steps"] == len(rows(run)) - 1
+    kept, cost = summary["conservation"], summary["cost"]
+    energy = np.array([float(row["total_energy"]) for row in rows(run)])
+    # E/E_0 - 1 rounds at 1e-16, (E - E_0)/E_0 does not
+    assert kept["energy_drift"] == pytest.approx(energy[-1] / energy[0] - 1, abs=3e-16)
+    assert kept["energy_drift_max"] >= abs(kept["energy_drift"])
+    session = cost["session"]
+    assert session["steps"] == summary["steps"]
+    assert session["updates"] == summary["steps"] * summary["particles"]
+    assert session["peak_memory_bytes"] > 50e6  # Python with NumPy alone takes more
+    assert any(config.physics.scheme in part for part in summary["compiled_in"])
+    switched = not isinstance(config.physics.alpha, float)
+    assert any("alpha" in part for part in summary["compiled_in"]) == switched
+    assert any("alpha" in part for part in summary["left_out"]) != switched
+
+
+def test_seconds_by_phase_add_up(uninterrupted):
+    session = json.loads(uninterrupted.run.summary.read_text())["cost"]["session"]
+    phases = session["phases_cpu_seconds"]
+    assert {"order", "lists", "density", "rates", "output", "predict, correct"} <= set(phases)
+    computing = session["cpu_seconds"] - session["compile_cpu_seconds"]
+    # outside of phases: the rows of the history, loading of compiled code; a rounding for each
+    assert sum(phases.values()) <= computing + 0.01
+    assert sum(phases.values()) >= 0.7 * computing - 0.1
+    assert all(seconds >= 0 for seconds in phases.values())
+
+
+def test_errors_where_there_is_an_exact_solution(tube):
+    errors = json.loads(tube.summary.read_text())["errors"]
+    assert errors["region"] == "the whole domain"
+    assert set(errors["fields"]) == {"density", "velocity", "pressure", "internal_energy"}
+    for norms in errors["fields"].values():
+        assert 0 < norms["L1"] <= norms["L2"] <= norms["Linf"]
+    last = checkpoints.read(tube.checkpoint_path(4))
+    exact = last.config.problem.exact(
+        last.config.physics.eos_model(), last.time, last.particles.position
+    )
+    difference = np.abs(last.particles.density - exact["density"])
+    volume = last.particles.mass / last.particles.density
+    found = errors["fields"]["density"]
+    # sums of 60 numbers in another order
+    assert found["L1"] == pytest.approx(np.average(difference, weights=volume), rel=1e-12)
+    assert found["Linf"] == difference.max()
+
+
+def test_where_there_is_no_exact_solution_the_summary_says_so(uninterrupted):
+    found = json.loads(uninterrupted.run.summary.read_text())
+    none = found["problem"] == "kelvin_helmholtz"
+    assert (found["errors"] is None) == none
+    assert ("Error: this problem has no exact solution here." in in_words(found)) == none
+
+
+def test_momentum_is_judged_only_where_no_wall_takes_it(uninterrupted):
+    found = json.loads(uninterrupted.run.summary.read_text())
+    change = found["conservation"]["momentum_change"]
+    assert (change is None) == (found["problem"] == "shock_tube")
+    # pair forces cancel exactly but for rounding: 1e-16 of the sum of m (|v| + c) a step, with room
+    assert change is None or change < 1e-12
+    assert ("walls take momentum up" in in_words(found)) == (change is None)

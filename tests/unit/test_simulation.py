@@ -1,0 +1,189 @@
+"""The step: where it ends, what it measures, and that threads do not show in it."""
+
+import math
+
+import numpy as np
+import pytest
+
+from sph import config as configuration
+from sph.clock import Clock
+from sph.errors import NumericalError
+from sph.output.checkpoint import state_hash
+from sph.scene import Scene
+from sph.simulation import Simulation
+from sph.threads import SMALLEST_RANGE, Team
+
+TUBE = """
+[problem]
+name = "shock_tube"
+n = 60
+[time]
+end = 0.2
+[output]
+interval = 0.05
+"""
+SHEAR = """
+[problem]
+name = "kelvin_helmholtz"
+n = 4400
+[physics]
+alpha = { min = 0.1, max = 2.0 }
+[time]
+end = 0.02
+[output]
+interval = 0.02
+"""
+
+
+@pytest.fixture
+def begin():
+    """begin(text, *overrides, threads=1): a simulation at t = 0, closed after the test."""
+    begun = []
+
+    def start(text, *overrides, threads=1):
+        config = configuration.from_text(text).override(overrides)
+        begun.append(Simulation.start(Scene(config), threads, Clock()))
+        return begun[-1]
+
+    yield start
+    for simulation in begun:
+        simulation.close()
+        simulation.clock.close()
+
+
+def fingerprint(simulation):
+    """What a step leaves, down to the last bit."""
+    arrays = simulation.particles.arrays() | {"time": simulation.time, "dt": simulation.limit.dt}
+    return state_hash(arrays), simulation.limit, simulation.totals.energy
+
+
+# --- threads ----------------------------------------------------------------------------------
+
+
+def test_two_threads_give_the_bits_of_one(begin, monkeypatch):
+    shared = []
+    run = Team.run
+
+    def counted(team, function, items, *arguments, smallest=SMALLEST_RANGE):
+        shared.append(team.threads > 1 and items // smallest >= 2)
+        run(team, function, items, *arguments, smallest=smallest)
+
+    monkeypatch.setattr(Team, "run", counted)
+    one, two = (begin(SHEAR, threads=threads) for threads in (1, 2))
+    assert any(shared)  # else this shows nothing
+    assert fingerprint(one) == fingerprint(two)
+    builds = one.list_builds
+    for _ in range(6):
+        one.advance(0.02)
+        two.advance(0.02)
+        assert fingerprint(one) == fingerprint(two)
+    assert one.list_builds > builds  # with new lists on the way
+
+
+# --- where a step ends ------------------------------------------------------------------------
+
+
+def test_a_step_is_cut_to_land_on_the_time_asked_for(begin):
+    simulation = begin(TUBE)
+    allowed = simulation.limit.dt
+    simulation.advance(0.3 * allowed)
+    assert (simulation.time, simulation.step) == (0.3 * allowed, 1)
+    while simulation.time < 0.07:
+        simulation.advance(0.07)
+        assert simulation.time <= 0.07
+    assert simulation.time == 0.07
+    assert simulation.step > 10
+
+
+def test_a_step_is_what_the_criteria_allow(begin):
+    simulation = begin(TUBE)
+    allowed = simulation.limit.dt
+    simulation.advance(math.inf)
+    assert (simulation.time, simulation.step, simulation.steps_here) == (allowed, 1, 1)
+
+
+@pytest.mark.parametrize(
+    ("short_of", "steps"), [(0.0, 1), (1e-10, 1), (-1e-10, 1), (1e-6, 1), (-1e-6, 2)]
+)
+def test_a_remainder_that_is_rounding_is_no_step_of_its_own(begin, short_of, steps):
+    """short_of: by what part of a step the first one would pass the end."""
+    simulation = begin(TUBE)
+    until = simulation.limit.dt * (1 - short_of)
+    while simulation.time < until:
+        simulation.advance(until)
+    assert (simulation.time, simulation.step) == (until, steps)
+
+
+def test_the_limit_names_its_particle_and_criterion(begin):
+    simulation = begin(SHEAR)
+    p, limit = simulation.particles, simulation.limit
+    i = int(np.flatnonzero(p.id == limit.particle)[0])
+    assert limit.criterion == "signal_speed"
+    # eq 32 with the fastest signal of that particle; one division and one product of rounding
+    expected = 0.15 * 2 * p.support[i] / simulation._signal_speed[i]
+    assert limit.dt == pytest.approx(expected, rel=4e-16)
+    assert limit.dt == pytest.approx(
+        0.15 * np.min(2 * p.support / simulation._signal_speed), rel=4e-16
+    )
+
+
+def test_the_energy_criterion(begin):
+    heating = [
+        "problem.left={density=1.0,velocity=5.0,pressure=1.0e-3}",
+        "problem.right={density=1.0,velocity=-5.0,pressure=1.0e-3}",
+    ]
+    limited = begin(TUBE, *heating)
+    free = begin(TUBE, *heating, "physics.energy_limit=false")
+    p = limited.particles
+    with np.errstate(divide="ignore"):
+        expected = 0.15 * np.min(p.internal_energy / np.abs(p.energy_rate))
+    assert limited.limit.criterion == "energy"
+    assert limited.limit.dt == pytest.approx(expected, rel=4e-16)
+    assert free.limit.criterion == "signal_speed"
+    assert free.limit.dt > 2 * limited.limit.dt
+
+
+# --- what is measured -------------------------------------------------------------------------
+
+
+def test_totals(begin):
+    simulation = begin(SHEAR)
+    simulation.advance(math.inf)
+    p, totals = simulation.particles, simulation.totals
+    kinetic = 0.5 * math.fsum(p.mass * (p.velocity**2).sum(axis=0))
+    internal = math.fsum(p.mass * p.internal_energy)
+    # 4200 positive terms added in any order: N/2 roundings of 1e-16 at the very worst
+    assert totals.kinetic_energy == pytest.approx(kinetic, rel=1e-12)
+    assert totals.internal_energy == pytest.approx(internal, rel=1e-12)
+    assert totals.energy == totals.kinetic_energy + totals.internal_energy
+    for axis in range(2):
+        size = np.sum(p.mass * np.abs(p.velocity[axis]))
+        momentum = math.fsum(p.mass * p.velocity[axis])
+        assert totals.momentum[axis] == pytest.approx(momentum, abs=1e-12 * size)
+    for name, values in (("density", p.density), ("internal_energy", p.internal_energy)):
+        assert getattr(totals, f"min_{name}") == values.min()
+        assert getattr(totals, f"max_{name}") == values.max()
+
+
+# --- numbers that mean nothing ----------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [("internal_energy", -1.0), ("internal_energy", np.nan), ("velocity", np.inf)],
+)
+def test_a_bad_particle_is_named(begin, name, value):
+    simulation = begin(TUBE, "physics.energy_limit=false")
+    getattr(simulation.particles, name)[..., 7] = value
+    with pytest.raises(NumericalError) as caught:
+        simulation._measure()
+    words = name.replace("_", " ")
+    assert f"{words} of particle {simulation.particles.id[7]} at (" in str(caught.value)
+    assert f"{value}" in str(caught.value)
+    assert "; 1 particle(s) are so" in str(caught.value)
+    assert "Try: a smaller physics.C" in str(caught.value)
+
+
+def test_a_support_that_does_not_fit_the_box_is_refused_at_the_start(begin):
+    with pytest.raises(NumericalError, match=r"particle \d+ needs a kernel support of .*wider"):
+        begin(TUBE, "problem.boundary=periodic", "physics.eta=30.0")
