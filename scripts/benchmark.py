@@ -125,7 +125,7 @@ def engine(repeats: int) -> None:
     for per_axis in (32, 64, 100):
         for threads in (1, 2):
             cost, rates = median_of(
-                repeats, rate, text=uniform(n=per_axis**3, steps=12 if per_axis > 50 else 40),
+                repeats, rate, text=uniform(n=per_axis**3, steps=16),
                 threads=threads,
             )  # fmt: skip
             updates = cost["updates"]

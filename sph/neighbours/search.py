@@ -108,6 +108,7 @@ class Search:
         largest = int(np.argmax(origin.support))
         self.domain.check_reach((1 + origin.skin) * origin.support[largest], int(identity[largest]))
         boxes = tree.build(origin.position, origin.support)
+        self.lists = None  # the old ones, the largest arrays there are, make room for the new
         self.lists, self._room = lists.build(
             boxes, origin.position, origin.support, origin.skin, self.domain.images, self.team,
             self._room,
@@ -122,16 +123,18 @@ class Search:
         self.build(Origin(position.copy(), support, self.origin.skin), identity)
 
 
+# Levels of the tree, from the blocks upwards, at which the spacing is read: 8 to 64 particles.
+GUESS_LEVELS = 4
+
+
 @njit(**COMPILED, forceinline=True)
-def _spacing(position, a, b):
-    """Spacing s of the n particles [a, b): along axes s apart, they span prod (e + s) = n s^D."""
-    D = position.shape[0]
-    extent = np.empty(D)
-    for d in range(D):
-        extent[d] = np.ptp(position[d, a:b])
+def _spacing(lower, upper, n):
+    """Spacing s of n particles in a box: s apart along axes, they span prod (e + s) = n s^D."""
+    D = lower.size
+    extent = upper - lower
     spacing = extent.max()
     for _ in range(30):  # a contraction: each pass halves the error at the least
-        spacing = (np.prod(extent + spacing) / (b - a)) ** (1 / D)
+        spacing = (np.prod(extent + spacing) / n) ** (1 / D)
     return spacing
 
 
@@ -139,15 +142,24 @@ def _spacing(position, a, b):
 def first_guess(position, ratio):
     """Supports to begin the search of the true ones with, (N,), for positions in block order.
 
-    ratio = (H/h) eta times the spacing of the particle's block.
+    ratio = (H/h) eta times the least spacing of the boxes that hold the particle. (A box that cuts
+    through planes of a lattice, or a gradient of density, shows too wide a spacing: supports that
+    begin too wide cost lists of many candidates, ones too narrow only a second build.)
     """
     n = position.shape[1]
+    first, last, lower, upper, _ = tree.build(position, np.zeros(n))
     # where particles coincide there is no spacing to be seen: begin from a small support
-    least = 1e-6 * _spacing(position, 0, n)
+    least = 1e-6 * _spacing(lower[0], upper[0], n)
     guess = np.empty(n)
-    for a in range(0, n, BLOCK):
-        # one particle alone spans nothing: count it with the block before
-        begin = a if a + 1 < n else max(0, a - BLOCK)
-        end = min(a + BLOCK, n)
-        guess[a:end] = ratio * max(_spacing(position, begin, end), least)
+    for leaf in range(first.size):
+        if last[leaf] - first[leaf] != 1:
+            continue
+        spacing = np.inf
+        node = leaf
+        for _ in range(GUESS_LEVELS):
+            count = min(last[node] * BLOCK, n) - first[node] * BLOCK
+            if count > 1:  # one particle alone spans nothing
+                spacing = min(spacing, _spacing(lower[node], upper[node], count))
+            node = max(0, (node - 1) // 2)
+        guess[first[leaf] * BLOCK : last[leaf] * BLOCK] = ratio * max(spacing, least)
     return guess
