@@ -196,7 +196,7 @@ class Problem(base.Problem):
                 ("density", "velocity", "pressure"), values, exact, strict=True
             ):
                 error = float(np.median(value[inside])) - truth
-                figures[f"plateau_{side}_{name}"] = error / abs(truth) if truth else error
+                figures[f"plateau_{side}_{name}_error"] = error / abs(truth) if truth else error
         return figures
 
     def _states(self) -> tuple[riemann.State, riemann.State]:

@@ -236,8 +236,8 @@ def test_report_of_the_exact_profile_finds_no_error_and_sees_one():
     assert max(map(abs, plateaus.values())) < 1e-14  # round-off of a ratio
     assert report["peak_density"] == report["peak_density_exact"] == 1.0
     wrong = problem.report(AIR, 0.2, particles, 1.01 * exact["pressure"])
-    assert wrong["plateau_left_pressure"] == pytest.approx(0.01, abs=1e-14)
-    assert wrong["plateau_right_pressure"] == pytest.approx(0.01, abs=1e-14)
+    assert wrong["plateau_left_pressure_error"] == pytest.approx(0.01, abs=1e-14)
+    assert wrong["plateau_right_pressure_error"] == pytest.approx(0.01, abs=1e-14)
 
 
 @pytest.mark.parametrize(
