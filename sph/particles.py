@@ -31,16 +31,20 @@ class Particles:
         """Particles with IDs 1 … N in the order given and nothing computed yet (zeros)."""
         n = position.shape[1]
         evolves = alpha is not None
+
+        def contiguous(array):
+            return np.array(array, dtype=np.float64, order="C")
+
         return cls(
             id=np.arange(1, n + 1, dtype=np.int64),
-            mass=np.array(mass, dtype=np.float64),
-            position=np.array(position, dtype=np.float64),
-            velocity=np.array(velocity, dtype=np.float64),
-            internal_energy=np.array(internal_energy, dtype=np.float64),
+            mass=contiguous(mass),
+            position=contiguous(position),
+            velocity=contiguous(velocity),
+            internal_energy=contiguous(internal_energy),
             support=np.zeros(n),
             density=np.zeros(n),
             omega=np.zeros(n),
-            acceleration=np.zeros_like(position, dtype=np.float64),
+            acceleration=np.zeros(position.shape),
             energy_rate=np.zeros(n),
             alpha=np.full(n, alpha) if evolves else None,
             alpha_rate=np.zeros(n) if evolves else None,

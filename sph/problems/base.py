@@ -37,10 +37,12 @@ class Problem(Section):
       defaults   this problem's defaults for keys of other tables, e.g. {"physics.gamma": 1.4}
       limits     figures of the summary ("energy_drift", "l1.density", …) that its shipped
                  configuration must keep, each with the reason for the number
+      radial     whether, in 2-D and 3-D, the solution depends on the distance from `centre` alone
     """
 
     defaults: ClassVar[dict[str, Any]] = {}
     limits: ClassVar[dict[str, Limit]] = {}
+    radial: ClassVar[bool] = False
 
     name: str = Field(description="which problem: `sph list` names them")
     dimension: int = Field(ge=1, le=3, description="number of space dimensions")
@@ -65,6 +67,11 @@ class Problem(Section):
         """The boundary of each axis."""
         one = isinstance(self.boundary, str)
         return (self.boundary,) * self.dimension if one else tuple(self.boundary)
+
+    @property
+    def centre(self) -> np.ndarray:
+        """(D,) the middle of the box."""
+        return self.box.mean(axis=1)
 
     def initial(self, eos) -> InitialState:
         """The particles at t = 0 for that equation of state."""

@@ -22,6 +22,7 @@ class Problem(base.Problem):
         "time.end": 0.05,
         "output.interval": 0.01,
     }
+    radial: ClassVar = True
     limits: ClassVar = {
         "energy_drift": base.Limit(
             2e-3, "other SPH codes drift by 0.02 % to 1 % on this blast with individual steps"

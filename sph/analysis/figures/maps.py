@@ -61,7 +61,8 @@ def plane_of(state: State, pixels: int) -> Plane:
         if boundary == "open":
             low, high = np.percentile(state.particles.position[axis], [0.1, 99.9])
             box[axis] = min(box[axis, 0], low), max(box[axis, 1], high)
-    return Plane.through_centre(box, pixels)
+    plane = Plane.through_centre(box, pixels)
+    return plane if plane.height is None else plane._replace(height=float(state.problem.centre[2]))
 
 
 class _Density(NamedTuple):

@@ -33,10 +33,9 @@ def profile(state: State) -> Profile:
     inside, _ = problem.error_region(state.eos, state.time, particles.position)
     if not inside.any():
         inside[:] = True
-    centre = problem.box.mean(axis=1)
     position, velocity = particles.position[:, inside], particles.velocity[:, inside]
     if state.is_radial:
-        offset = position - centre[:, None]
+        offset = position - problem.centre[:, None]
         coordinate = np.linalg.norm(offset, axis=0)
         along = (velocity * offset).sum(axis=0) / np.where(coordinate > 0.0, coordinate, 1.0)
     else:
@@ -60,7 +59,7 @@ def _exact_along(state: State, at: np.ndarray) -> dict[str, np.ndarray]:
     """On a line along x through the centre of the box, where `at` is x or the radius."""
     if not state.has_exact:
         return {}
-    position = np.repeat(state.problem.box.mean(axis=1)[:, None], at.size, axis=1)
+    position = np.repeat(state.problem.centre[:, None], at.size, axis=1)
     position[0] = position[0] + at if state.is_radial else at
     exact = state.exact(position)
     return exact | {"velocity": exact["velocity"][0]}

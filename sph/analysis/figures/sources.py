@@ -139,27 +139,7 @@ class State:
         )
         return {name: norm["L1"] for name, norm in found["fields"].items()} if found else {}
 
-    @cached_property
+    @property
     def is_radial(self) -> bool:
-        """Whether the exact solution, at the run's end, is the same along all axes from the centre.
-
-        A uniform one is not: it has no centre.
-        """
-        if self.dimension == 1 or not self.has_exact:
-            return False
-        end = self.checkpoint.config.time.end
-        reach = (self.problem.box[:, 1] - self.problem.box[:, 0]).min() / 2
-        distance = np.linspace(0.01, 0.99, 50) * reach
-        along = [
-            self.problem.exact(self.eos, end, self._on_axis(axis, distance))["density"]
-            for axis in range(self.dimension)
-        ]
-        # the same formula at the same radius but for the round-off of adding the centre
-        alike = all(np.allclose(other, along[0], rtol=1e-6) for other in along)
-        return alike and np.ptp(along[0]) > 0.0
-
-    def _on_axis(self, axis: int, distance: np.ndarray) -> np.ndarray:
-        """(D, M) positions at `distance` (M,) from the box's centre along `axis`."""
-        position = np.repeat(self.problem.box.mean(axis=1)[:, None], distance.size, axis=1)
-        position[axis] += distance
-        return position
+        """Whether profiles are drawn against the distance from the problem's centre."""
+        return self.problem.radial and self.dimension > 1
