@@ -5,6 +5,7 @@ from pathlib import Path
 
 import click
 
+from sph import cli_studies
 from sph.errors import SphError
 from sph.version import __version__
 
@@ -128,6 +129,9 @@ def list_choices():
 def _with_threads(overrides, threads):
     return [*overrides, *([f"run.threads={threads}"] if threads else [])]
 
+
+main.add_command(cli_studies.sweep)
+main.add_command(cli_studies.report)
 
 if __name__ == "__main__":
     main()

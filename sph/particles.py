@@ -25,6 +25,7 @@ class Particles:
     energy_rate: np.ndarray  # (N,) du/dt
     alpha: np.ndarray | None = None  # (N,) viscosity coefficient, where it evolves
     alpha_rate: np.ndarray | None = None  # (N,)
+    pressure: np.ndarray | None = None  # (N,) where the scheme sums it over neighbours
 
     @classmethod
     def at_start(cls, position, velocity, mass, internal_energy, alpha: float | None = None):
@@ -57,6 +58,12 @@ class Particles:
     @property
     def dimension(self) -> int:
         return self.position.shape[0]
+
+    def pressure_by(self, eos) -> np.ndarray:
+        """(N,) the pressure the scheme summed or, where it sums none, that of `eos`."""
+        if self.pressure is not None:
+            return self.pressure
+        return eos.pressure(self.density, self.internal_energy)
 
     def arrays(self) -> dict[str, np.ndarray]:
         """The arrays that this scene has, by name."""

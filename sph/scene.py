@@ -45,6 +45,10 @@ class Scene:
         return self.config.physics.conductivity is not None
 
     @property
+    def sums_pressure(self) -> bool:
+        return schemes.sums_pressure(self.models.scheme)
+
+    @property
     def needs_curl(self) -> bool:
         return self.config.physics.balsara and self.dimension > 1
 
@@ -101,6 +105,7 @@ class Scene:
                 outside.append(f"{what}: {why_not}")
 
         part(self.evolves_alpha, "equation for alpha", "alpha is one number")
+        part(self.sums_pressure, "sum of the pressure", f"{physics.scheme} takes it from density")
         part(self.conducts, "artificial conductivity", "physics.conductivity is not given")
         part(physics.balsara, "Balsara factor", "physics.balsara = false")
         part(self.needs_divergence, "divergence of velocity", "neither Balsara nor alpha needs it")

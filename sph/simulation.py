@@ -21,6 +21,9 @@ from sph.threads import Team
 # Each widening lists to at least the radius that was asked for, which grows by 2 at the most.
 MAX_WIDENINGS = 60
 
+# Arrays that a step fills before it reads them: a new order need not carry them along.
+NEW_EACH_STEP = ("acceleration", "energy_rate", "alpha_rate", "density", "omega", "pressure")
+
 
 class Totals(NamedTuple):
     """Sums and extremes over all particles."""
@@ -90,12 +93,17 @@ class Simulation:
         self.limit = None
         self.totals = None
         n, blocks = particles.number, number_of_blocks(particles.number)
+        if not scene.sums_pressure:
+            particles.pressure = None
+        elif particles.pressure is None:  # a start, or a restart that has changed the scheme
+            particles.pressure = particles.pressure_by(scene.eos)
         self._dim = (0,) * scene.dimension
         self._support = np.zeros(n)
         self._velocity = np.empty_like(particles.velocity)  # full-step predictions (eqs 4-6)
         self._energy = np.empty(n)
         self._alpha = np.empty(n) if scene.evolves_alpha else None
         self._pressure_term = np.empty(n)
+        self._energy_shift = np.empty(n) if scene.sums_pressure else None
         self._sound_speed = np.empty(n)
         self._signal_speed = np.empty(n)
         self._wanted = np.empty(blocks)
@@ -183,8 +191,7 @@ class Simulation:
             self.scene.domain.bring_inside(p.position, (p.velocity, self._velocity))
             order = self.search.order(p.position, p.id)
             for name, array in p.arrays().items():
-                # what this step computes anew need not be carried along
-                if name not in ("acceleration", "energy_rate", "alpha_rate", "density", "omega"):
+                if name not in NEW_EACH_STEP:
                     setattr(p, name, np.ascontiguousarray(array[..., order]))
             self._velocity = np.ascontiguousarray(self._velocity[:, order])
             self._energy = self._energy[order]
@@ -211,6 +218,11 @@ class Simulation:
         p = self.particles
         return passes.Fields(support, p.density, p.omega, self._pressure_term, self._sound_speed)
 
+    def _summed(self) -> passes.SummedPressure | None:
+        if self._energy_shift is None:
+            return None
+        return passes.SummedPressure(self.particles.pressure, self._energy_shift)
+
     def _density(self, models) -> None:
         """Steps 2-4 and 6: density, support, Omega, div and curl, EOS, Balsara, alpha's rate."""
         p = self.particles
@@ -218,8 +230,9 @@ class Simulation:
             with self.clock.phase("density"):
                 self.team.run(
                     density.density, self._wanted.size, self._dim, models, self._neighbours(),
-                    self._gas(), self._alpha, self._fields(self._support), self._div_v,
-                    self._curl_v, self._balsara, p.alpha_rate, self._wanted,
+                    self._gas(), self._alpha, self._fields(self._support),
+                    self._summed(), self._div_v, self._curl_v, self._balsara, p.alpha_rate,
+                    self._wanted,
                 )  # fmt: skip
             if not self._wanted.max() > 0.0:
                 p.support, self._support = self._support, p.support
@@ -240,8 +253,8 @@ class Simulation:
         with self.clock.phase("rates"):
             self.team.run(
                 rates.rates, self._wanted.size, self._dim, models, self._neighbours(),
-                self._gas(), self._alpha, self._fields(p.support), self._balsara,
-                self._energy if self.scene.conducts else None, p.acceleration,
+                self._gas(), self._alpha, self._fields(p.support), self._summed(),
+                self._balsara, self._energy if self.scene.conducts else None, p.acceleration,
                 p.energy_rate, self._signal_speed,
             )  # fmt: skip
 

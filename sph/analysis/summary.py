@@ -16,7 +16,7 @@ def of_run(simulation, history: dict[str, np.ndarray], status: str, reason: str 
     """
     scene, particles = simulation.scene, simulation.particles
     problem, eos = scene.config.problem, scene.eos
-    pressure = eos.pressure(particles.density, particles.internal_energy)
+    pressure = particles.pressure_by(eos)
     inside, outside = scene.parts()
     result = {
         "status": status,

@@ -81,6 +81,16 @@ class Physics(Section):
             return {"gamma": None} | data
         return data
 
+    @model_validator(mode="after")
+    def _scheme_takes_the_gas(self):
+        from sph import schemes
+
+        scheme = registry.model_class("sph.schemes", self.scheme)
+        if schemes.sums_pressure(scheme) and not hasattr(self.eos_model(), "gamma"):
+            problem = f'= "{self.scheme}": expected an ideal gas with it, not {self.eos}'
+            raise as_error([Issue(("scheme",), problem)])
+        return self
+
     def kernel_model(self):
         """The smoothing kernel, a NamedTuple of `sph.kernels`."""
         from sph import kernels

@@ -53,9 +53,8 @@ class Checkpoint:
 
     @property
     def pressure(self) -> np.ndarray:
-        """(N,) pressure of the corrected internal energy and the density."""
-        eos = self.config.physics.eos_model()
-        return eos.pressure(self.particles.density, self.particles.internal_energy)
+        """(N,) pressure of the corrected internal energy, as the scheme understands it."""
+        return self.particles.pressure_by(self.config.physics.eos_model())
 
 
 def write(path: Path, checkpoint: Checkpoint) -> None:

@@ -8,7 +8,7 @@ depend on the number of threads.
 
 Arguments that are None leave their part out of the compiled code: div_v (nothing needs the
 divergence), curl_v (1-D, or no Balsara factor), f (no Balsara factor), alpha (one constant),
-conducted (no conductivity).
+conducted (no conductivity), summed (the scheme takes its pressure from the equation of state).
 """
 
 from typing import NamedTuple
@@ -55,5 +55,12 @@ class Fields(NamedTuple):
     support: np.ndarray  # H
     density: np.ndarray
     omega: np.ndarray
-    pressure_term: np.ndarray  # P/(Omega rho^2)
+    pressure_term: np.ndarray  # the scheme's, e.g. P/(Omega rho^2)
     sound_speed: np.ndarray
+
+
+class SummedPressure(NamedTuple):
+    """What a scheme has that sums its pressure over neighbours, each (N,)."""
+
+    pressure: np.ndarray
+    energy_shift: np.ndarray  # what a pair takes off its partner's u

@@ -5,16 +5,17 @@ from numba import njit
 
 from sph.compiled import COMPILED
 from sph.eos import pressure, sound_speed
-from sph.kernels import dw_over_q, normalisation
+from sph.kernels import dw_over_q, normalisation, w
 from sph.neighbours.lists import IMAGE_SHIFT
 from sph.neighbours.order import BLOCK
 from sph.passes.smoothing import find_support
+from sph.schemes import summed_terms
 from sph.viscosity import alpha_rate, balsara_factor
 
 
 @njit(**COMPILED)
 def density(
-    first_block, last_block, dim, models, neighbours, gas, alpha, fields, div_v, curl_v, f,
+    first_block, last_block, dim, models, neighbours, gas, alpha, fields, summed, div_v, curl_v, f,
     alpha_rates, wanted,
 ):  # fmt: skip
     """Density pass over blocks [first_block, last_block).
@@ -23,7 +24,7 @@ def density(
     the pass is run again. A particle whose support was not found gets a density of -1.
     """
     D = len(dim)
-    _, kernel, smoothing, eos, viscosity, _, balsara, support_ratio, eta = models
+    scheme, kernel, smoothing, eos, viscosity, _, balsara, support_ratio, eta = models
     lists, images, list_support, reach_factor = neighbours
     start, count, candidates = lists
     sign, offset = images
@@ -37,6 +38,7 @@ def density(
     v = np.empty((D, size))
     m = np.empty(size)
     r = np.empty(size)
+    mu = np.empty(size if summed is not None else 0)
     for block in range(first_block, last_block):
         nc = count[block]
         for k in range(nc):
@@ -48,6 +50,8 @@ def density(
                 x[d, k] = sign[image, d] * position[d, j] + offset[image, d]
                 if div_v is not None:
                     v[d, k] = sign[image, d] * velocity[d, j]
+            if summed is not None:
+                mu[k] = mass[j] * energy[j]
         wanted[block] = 0.0
         for i in range(block * BLOCK, min((block + 1) * BLOCK, mass.size)):
             for k in range(nc):
@@ -67,6 +71,18 @@ def density(
             c_i = sound_speed(eos, rho_i, P)
             pressure_term[i] = P / (Omega_i * rho_i * rho_i)
             c_s[i] = c_i
+            if summed is not None:
+                H_inv = 1.0 / H
+                sum_w = sum_dw = 0.0
+                for k in range(nc):
+                    q = r[k] * H_inv
+                    sum_w += mu[k] * w(kernel, dim, q)
+                    sum_dw += mu[k] * (q * q) * dw_over_q(kernel, dim, q)
+                scale = C * H_inv**D
+                change = -scale * (sum_w + sum_dw / D)  # H/D d/dH of the sum, by eq 10
+                summed.pressure[i], pressure_term[i], summed.energy_shift[i] = summed_terms(
+                    scheme, eos, energy[i], scale * sum_w, change / (Omega_i * rho_i)
+                )
             if div_v is not None:
                 H_inv = 1.0 / H
                 scale = -C * H_inv ** (D + 2) / (Omega_i * rho_i)

@@ -17,7 +17,7 @@ TINY = 1e-300  # keeps 1/r finite where r_ij = 0 and the vector it multiplies is
 
 @njit(**COMPILED)
 def rates(
-    first_block, last_block, dim, models, neighbours, gas, alpha, fields, f, conducted,
+    first_block, last_block, dim, models, neighbours, gas, alpha, fields, summed, f, conducted,
     acceleration, energy_rate, signal_speed,
 ):  # fmt: skip
     """Rate pass over blocks [first_block, last_block): eqs 22-26.
@@ -30,7 +30,7 @@ def rates(
     lists, images, _, _ = neighbours
     start, count, candidates = lists
     sign, offset = images
-    position, velocity, mass, _, _ = gas
+    position, velocity, mass, energy, _ = gas
     support, density, _, pressure_term, sound_speeds = fields
     C = normalisation(kernel, dim)
     size = 0
@@ -46,8 +46,9 @@ def rates(
     gradient = np.empty(size)
     alphas = np.empty(size if alpha is not None else 0)
     fs = np.empty(size if f is not None else 0)
-    us = np.empty(size if conducted is not None else 0)
-    Ps = np.empty(size if conducted is not None else 0)
+    us = np.empty(size if conducted is not None or summed is not None else 0)
+    Ps = np.empty(size if conducted is not None or summed is not None else 0)
+    shifts = np.empty(size if summed is not None else 0)
     force = np.empty(size)
     for block in range(first_block, last_block):
         nc = count[block]
@@ -71,12 +72,18 @@ def rates(
             if conducted is not None:
                 us[k] = conducted[j]
                 Ps[k] = pressure(eos, density[j], conducted[j])
+            if summed is not None:
+                us[k] = energy[j]
+                Ps[k] = summed.pressure[j]
+                shifts[k] = summed.energy_shift[j]
         for i in range(block * BLOCK, min((block + 1) * BLOCK, mass.size)):
             rho_i, P_term_i, c_i = density[i], pressure_term[i], sound_speeds[i]
             H_inv_i = 1.0 / support[i]
             gradient_i = 1.0 / support[i] ** (D + 2)
             if conducted is not None:
                 P_i = pressure(eos, rho_i, conducted[i])
+            if summed is not None:
+                P_i = summed.pressure[i]
             heating = 0.0
             fastest = 0.0
             for k in range(nc):
@@ -101,7 +108,11 @@ def rates(
                 Pi *= v_sig * w_ij * (inverse * r)
                 if f is not None:
                     Pi *= 0.5 * f[i] + fs[k]
-                force[k], work = pair(scheme, P_term_i, P_term[k], slope_i, slope_j, Pi)
+                term_i, term_j = P_term_i, P_term[k]
+                if summed is not None:
+                    term_i *= us[k] - summed.energy_shift[i]
+                    term_j *= energy[i] - shifts[k]
+                force[k], work = pair(scheme, term_i, term_j, slope_i, slope_j, Pi)
                 heating += work * v_dot_r
                 if conducted is not None:
                     speed = exchange_speed(conductivity, P_i, Ps[k], rho_i, rho[k], w_ij)

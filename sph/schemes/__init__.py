@@ -7,6 +7,13 @@ A scheme is a NamedTuple with the method
 where term = P/(Omega rho^2) of either, Pi is the viscous term f_ij Pi_ij, and slope_i, slope_j are
 m_j/2 (dW/dr)/r at H_i and at H_j. The acceleration of i is minus the sum of force r_ij, its rate of
 energy the sum of heating v_ij . r_ij.
+
+A scheme whose pressure is itself a sum over neighbours has the class attribute `sums_pressure` and
+
+    summed_terms(eos, energy, density_of_energy, slope)    (pressure, factor, energy_shift)
+
+of a particle, from the sum of m_j u_j W_ij(H_i) and from its H/D d/dH over Omega rho; the terms of
+its pairs are then factor_i (u_j - energy_shift_i) and factor_j (u_i - energy_shift_j).
 """
 
 from sph import registry
@@ -16,6 +23,16 @@ from sph.compiled import verb
 @verb
 def pair(self, term_i, term_j, slope_i, slope_j, Pi):
     return self.pair(term_i, term_j, slope_i, slope_j, Pi)
+
+
+@verb
+def summed_terms(self, eos, energy, density_of_energy, slope):
+    return self.summed_terms(eos, energy, density_of_energy, slope)
+
+
+def sums_pressure(scheme) -> bool:
+    """Whether the density pass is to sum that scheme's pressure."""
+    return getattr(scheme, "sums_pressure", False)
 
 
 def make(name: str):

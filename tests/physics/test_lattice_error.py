@@ -4,7 +4,7 @@ import itertools
 
 import numpy as np
 import pytest
-from conftest import CONFIGS, simulate
+from outcome import CONFIGS, simulate
 
 from sph import config as configuration
 

@@ -1,9 +1,9 @@
-"""The grad-h scheme written out densely in double precision: what the engine is measured against.
+"""The schemes written out densely in double precision: what the engine is measured against.
 
 Every particle meets every particle and every image of it; nothing here knows of trees, blocks or
 lists, and nothing is imported from the program. Equation numbers are those of the paper's grad-h
-section; where it misprints, the correction stands beside the formula. Code units throughout;
-vectors are (D, N), scalars (N,).
+section unless another paper is named; where it misprints, the correction stands beside the formula.
+Code units throughout; vectors are (D, N), scalars (N,).
 """
 
 import itertools
@@ -32,12 +32,51 @@ def cubic_spline(q, dimension):
     return norm * value, -6 * norm * np.where(q < 0.5, 2 * q - 3 * q**2, p**2)
 
 
-KERNELS = {"wendland_c2": wendland_c2, "cubic_spline": cubic_spline}
+def _wendland(q, norm, power, polynomial):
+    """(w, dw/dq) of norm (1 - q)^power times a polynomial, lowest coefficient first."""
+    p, factor = np.maximum(1.0 - q, 0.0), np.polynomial.Polynomial(polynomial)
+    w = norm * p**power * factor(q)
+    return w, norm * (p**power * factor.deriv()(q) - power * p ** (power - 1) * factor(q))
+
+
+def wendland_c4(q, dimension):
+    """(w, dw/dq) of Dehnen & Aly (2012), table 1, at q = r/H, an array; zero from q = 1 on."""
+    norm = (3 / 2, 9 / np.pi, 495 / (32 * np.pi))[dimension - 1]
+    power, polynomial = (5, (1, 5, 8)) if dimension == 1 else (6, (1, 6, 35 / 3))
+    return _wendland(q, norm, power, polynomial)
+
+
+def wendland_c6(q, dimension):
+    """(w, dw/dq) of Dehnen & Aly (2012), table 1, at q = r/H, an array; zero from q = 1 on."""
+    norm = (55 / 32, 78 / (7 * np.pi), 1365 / (64 * np.pi))[dimension - 1]
+    power, polynomial = (7, (1, 7, 19, 21)) if dimension == 1 else (8, (1, 8, 25, 32))
+    return _wendland(q, norm, power, polynomial)
+
+
+def quintic_spline(q, dimension):
+    """(w, dw/dq) of Dehnen & Aly (2012), table 1, at q = r/H, an array; zero from q = 1 on."""
+    norm = (3**5 / 40, 3**7 * 7 / (478 * np.pi), 3**7 / (40 * np.pi))[dimension - 1]
+    knots = [(1, 1), (-6, 2 / 3), (15, 1 / 3)]
+    w = sum(factor * np.maximum(knot - q, 0.0) ** 5 for factor, knot in knots)
+    slope = sum(-5 * factor * np.maximum(knot - q, 0.0) ** 4 for factor, knot in knots)
+    return norm * w, norm * slope
+
+
+KERNELS = {
+    "wendland_c2": wendland_c2,
+    "wendland_c4": wendland_c4,
+    "wendland_c6": wendland_c6,
+    "cubic_spline": cubic_spline,
+    "quintic_spline": quintic_spline,
+}
 # H/h = 1/(2 sigma), sigma the standard deviation per axis at H = 1 (Dehnen & Aly 2012);
 # the paper prints 1.93492 for the 3-D Wendland kernel, which is sqrt(15)/2 = 1.936492.
 H_PER_h = {
     "wendland_c2": np.sqrt([21 / 2, 72 / 5, 15]) / 2,
+    "wendland_c4": np.sqrt([15, 132 / 7, 39 / 2]) / 2,
+    "wendland_c6": np.sqrt([39 / 2, 70 / 3, 24]) / 2,
     "cubic_spline": np.sqrt([12, 392 / 31, 40 / 3]) / 2,
+    "quintic_spline": np.sqrt([18, 51624 / 2771, 135 / 7]) / 2,
 }
 
 
@@ -51,6 +90,8 @@ class Scene:
     eta: float = 1.6
     C: float = 0.15
     alpha: float | dict[str, float] = 1.0  # or {"min": …, "max": …}
+    scheme: str = "grad_h"  # or "variational" or "pressure_energy"
+    conductivity: tuple[str, float] | None = None  # ("pressure_jump" or "approach", strength)
     kernel: str = "wendland_c2"
     flattened: bool = False  # the cubic spline's flattened gradient, in eqs 22-23 only
     balsara: bool = True
@@ -277,10 +318,14 @@ def _flow(scene, pairs, mass, velocity, state):
     }
 
 
-def _thermodynamics(scene, internal_energy, state):
+def _thermodynamics(scene, pairs, mass, internal_energy, state):
     """Pressure, sound speed and Balsara's factor, eqs 19-21."""
     pressure = (scene.gamma - 1) * state["density"] * internal_energy
     sound = np.sqrt(scene.gamma * pressure / state["density"])
+    if scene.scheme == "pressure_energy":  # Hopkins (2013): P_i = (gamma - 1) sum m_j u_j W_ij
+        w = scene.kernel_at(pairs.r, state["support"][pairs.i])[0]
+        weight = mass[pairs.j] * internal_energy[pairs.j]
+        pressure = (scene.gamma - 1) * pairs.sum(weight * w, len(mass))
     compression = abs(state["divergence"])
     denominator = compression + state["curl"] + 1e-4 * sound / state["support"]
     factor = np.ones_like(sound)
@@ -296,31 +341,105 @@ def _thermodynamics(scene, internal_energy, state):
     }
 
 
-def _forces(scene, pairs, mass, velocity, alpha, state):
+class PairForce(NamedTuple):
+    """What a scheme's pressures do to particle i of each pair, moduli of what it is summed from."""
+
+    push: np.ndarray  # (P,) acceleration along the unit vector
+    work: np.ndarray  # (P,) rate of energy
+    push_scale: np.ndarray  # (P,)
+    work_scale: np.ndarray  # (P,)
+
+
+def _pressure_grad_h(scene, pairs, mass, energy, state, along, radial):
+    """The pressures of eqs 22 and 23: `along` is dW/dr at H_i and at H_j."""
+    P = state["pressure"] / (state["omega"] * state["density"] ** 2)
+    m_dW = mass[pairs.j] / 2 * (along[0] + along[1])
+    push, work = -(P[pairs.i] + P[pairs.j]) * m_dW, P[pairs.i] * m_dW * radial
+    return PairForce(push, work, abs(push), abs(work))
+
+
+def _pressure_variational(scene, pairs, mass, energy, state, along, radial):
+    """Springel & Hernquist (2002), eqs 7 and 8, and the energy that follows from their entropy."""
+    own, other = (
+        (state["pressure"] / (state["omega"] * state["density"] ** 2))[side] * mass[pairs.j] * dW
+        for side, dW in zip((pairs.i, pairs.j), along, strict=True)
+    )
+    return PairForce(-(own + other), own * radial, abs(own) + abs(other), abs(own * radial))
+
+
+def _pressure_energy(scene, pairs, mass, energy, state, along, radial):
+    """Hopkins (2013), eqs 21 and 22, for supports that hold a mass as eqs 7 and 15 ask.
+
+    f_ij = 1 - [H_i/(D rho_i) dP_i/dH_i] / [(gamma - 1) u_j Omega_i]: his eq 12 with m_j for the
+    quantity that is summed to find H, where he sums 1.
+    """
+    i, j, n, P = pairs.i, pairs.j, len(mass), state["pressure"]
+    by_support = scene.kernel_at(pairs.r, state["support"][i])[2]
+    terms = (scene.gamma - 1) * mass[j] * energy[j] * by_support
+    per_mass = state["support"] / (scene.dimension * state["density"] * state["omega"])
+    change, change_scale = per_mass * pairs.sum(terms, n), per_mass * pairs.sum(abs(terms), n)
+
+    def term(side, opposite, dW):
+        factor = (scene.gamma - 1) ** 2 * mass[j] * energy[i] * energy[j] / P[side] * dW
+        in_f = 1 / ((scene.gamma - 1) * energy[opposite])
+        f, f_scale = 1 - change[side] * in_f, 1 + change_scale[side] * in_f
+        return factor * f, abs(factor) * f_scale
+
+    own, own_scale = term(i, j, along[0])
+    other, other_scale = term(j, i, along[1])
+    return PairForce(-(own + other), own * radial, own_scale + other_scale, own_scale * abs(radial))
+
+
+PRESSURES = {
+    "grad_h": _pressure_grad_h,
+    "variational": _pressure_variational,
+    "pressure_energy": _pressure_energy,
+}
+
+
+def _viscosity(pairs, alpha, state, w_ij, v_sig):
+    """(P,) the viscous term f_ij Pi_ij of eq 24."""
+    i, j, rho, f = pairs.i, pairs.j, state["density"], state["balsara"]
+    # eq 24 prints one alpha; with one per particle the pair takes their mean
+    term = -0.5 * 0.5 * (alpha[i] + alpha[j]) * v_sig * w_ij / (0.5 * (rho[i] + rho[j]))
+    return term * 0.5 * (f[i] + f[j])
+
+
+def _conduction(scene, pairs, mass, energy, state, w_ij, mean_dW):
+    """(P,) rate of energy of Price (2008), eq 27: sum m_j/rho_ij v_sig (u_i - u_j) e_ij.grad W."""
+    if scene.conductivity is None:
+        return np.zeros(len(w_ij))
+    name, strength = scene.conductivity
+    i, j, P, rho = pairs.i, pairs.j, state["pressure"], state["density"]
+    rho_ij = 0.5 * (rho[i] + rho[j])
+    speed = {"approach": abs(w_ij), "pressure_jump": np.sqrt(abs(P[i] - P[j]) / rho_ij)}[name]
+    return strength * speed * mass[j] / rho_ij * (energy[i] - energy[j]) * mean_dW
+
+
+def _forces(scene, pairs, mass, velocity, energy, alpha, state):
     """Acceleration, energy rate and largest signal speed, eqs 22-26."""
     n, i, j = len(mass), pairs.i, pairs.j
-    rho, sound, f, support = (
-        state[name] for name in ("density", "sound_speed", "balsara", "support")
-    )
+    sound, support = state["sound_speed"], state["support"]
     radial = (pairs.difference(velocity) * pairs.unit).sum(axis=0)
     w_ij = np.minimum(radial, 0.0)  # eq 26
     v_sig = sound[i] + sound[j] - 3 * w_ij  # eq 25
-    # eq 24 prints one alpha; with one per particle the pair takes their mean
-    viscosity = -0.5 * 0.5 * (alpha[i] + alpha[j]) * v_sig * w_ij / (0.5 * (rho[i] + rho[j]))
-    viscosity *= 0.5 * (f[i] + f[j])
-    P = state["pressure"] / (state["omega"] * rho**2)
-    slopes = scene.force_slope(pairs.r, support[i]) + scene.force_slope(pairs.r, support[j])
-    m_dW = mass[j] / 2 * slopes
-    push = -(P[i] + P[j] + viscosity) * m_dW * pairs.unit  # eq 22
-    work = (P[i] + viscosity / 2) * m_dW * radial  # eq 23
+    along = [scene.force_slope(pairs.r, support[side]) for side in (i, j)]
+    pressure = PRESSURES[scene.scheme](scene, pairs, mass, energy, state, along, radial)
+    mean_dW = 0.5 * (along[0] + along[1])
+    viscous = _viscosity(pairs, alpha, state, w_ij, v_sig) * mass[j] * mean_dW
+    conducted = _conduction(scene, pairs, mass, energy, state, w_ij, mean_dW)
+    push = pressure.push - viscous  # eq 22
+    work = pressure.work + 0.5 * viscous * radial  # eq 23
     fastest = np.zeros(n)
     np.maximum.at(fastest, i, v_sig)
     return {
-        "acceleration": pairs.sum(push, n),
-        "energy_rate": pairs.sum(work, n),
+        "acceleration": pairs.sum(push * pairs.unit, n),
+        "energy_rate": pairs.sum(work + conducted, n),
         "signal_speed": fastest,
-        "acceleration_scale": pairs.sum(np.linalg.norm(push, axis=0), n),
-        "energy_rate_scale": pairs.sum(abs(work), n),
+        "acceleration_scale": pairs.sum(pressure.push_scale + abs(viscous), n),
+        "energy_rate_scale": pairs.sum(
+            pressure.work_scale + abs(viscous * radial) + abs(conducted), n
+        ),
         "signal_speed_scale": fastest,
     }
 
@@ -357,8 +476,8 @@ def rates(scene, position, velocity, mass, internal_energy, support_guess, alpha
     # the pair set of eq 32's maximum; gradients vanish in it beyond their own H
     pairs = _pairs(scene, position, state["support"], state["support"])
     state |= _flow(scene, pairs, mass, velocity, state)
-    state |= _thermodynamics(scene, internal_energy, state)
-    state |= _forces(scene, pairs, mass, velocity, alpha, state)
+    state |= _thermodynamics(scene, pairs, mass, internal_energy, state)
+    state |= _forces(scene, pairs, mass, velocity, internal_energy, alpha, state)
     state |= _alpha_change(scene, alpha, state)
     return Rates(**state)
 

@@ -11,7 +11,7 @@ import dense
 import numpy as np
 import pytest
 
-from sph import config, kernels, passes, schemes, simulation
+from sph import config, kernels, passes, registry, schemes, simulation
 from sph.clock import Clock
 from sph.domain import Domain
 from sph.eos import ideal_gas
@@ -50,9 +50,13 @@ class Case:
     alpha: float | dict = 1.0
     balsara: bool = True
     flattened: bool = False
+    scheme: str = "grad_h"
+    conductivity: tuple[str, float] | None = None
 
     def __str__(self):
         parts = [f"{len(self.boundaries)}d", *self.boundaries, self.kernel, str(self.passes)]
+        parts += [self.scheme] * (self.scheme != "grad_h")
+        parts += [self.conductivity[0]] if self.conductivity else []
         parts += ["switched"] * self.evolves + ["balsara"] * self.balsara
         return "-".join(parts + ["flattened"] * self.flattened)
 
@@ -79,6 +83,8 @@ class Case:
             self.boundaries,
             eta=self.eta,
             alpha=self.alpha,
+            scheme=self.scheme,
+            conductivity=self.conductivity,
             kernel=self.kernel,
             flattened=self.flattened,
             balsara=self.balsara,
@@ -86,18 +92,25 @@ class Case:
         )
 
     @property
+    def conductivity_model(self):
+        if self.conductivity is None:
+            return None
+        name, strength = self.conductivity
+        return registry.model_class("sph.conductivity", name)(strength)
+
+    @property
     def models(self):
         parameters = {"flattened": self.flattened} if self.kernel == "cubic_spline" else {}
         kernel = kernels.make(self.kernel, **parameters)
         return passes.Models(
-            scheme=schemes.make("grad_h"),
+            scheme=schemes.make(self.scheme),
             kernel=kernel,
             smoothing=Converged(TIGHT) if self.passes == "converged" else FixedPasses(self.passes),
             eos=ideal_gas.IdealGas(1.4),
             viscosity=switched.SwitchedAlpha(**SWITCHED)
             if self.evolves
             else constant.ConstantAlpha(self.alpha),
-            conductivity=None,
+            conductivity=self.conductivity_model,
             balsara=balsara.Balsara() if self.balsara else None,
             support_ratio=kernels.support_ratio(kernel, self.dimension),
             eta=self.eta,
@@ -105,6 +118,7 @@ class Case:
 
 
 W, S = "wendland_c2", "cubic_spline"
+JUMP, APPROACH = ("pressure_jump", 0.7), ("approach", 1.3)
 PERIODIC, MIRROR, OPEN = "periodic", "mirror", "open"
 CASES = [
     Case((PERIODIC,), W, 1, alpha=1.5),
@@ -124,6 +138,12 @@ CASES = [
     Case((OPEN, OPEN, OPEN), S, "converged", alpha=SWITCHED),
     Case((PERIODIC, PERIODIC, PERIODIC), S, "converged", alpha=SWITCHED, flattened=True),
     Case((OPEN, PERIODIC, MIRROR), S, "converged", alpha=SWITCHED, flattened=True),
+    Case((MIRROR,), "wendland_c4", 2, scheme="variational", conductivity=JUMP),
+    Case((OPEN, OPEN), "quintic_spline", 2, scheme="variational", conductivity=APPROACH),
+    Case((OPEN, OPEN, OPEN), "wendland_c6", 2, scheme="variational"),
+    Case((OPEN,), W, 2, scheme="pressure_energy"),
+    Case((MIRROR, PERIODIC), W, "converged", SWITCHED, scheme="pressure_energy", conductivity=JUMP),
+    Case((PERIODIC, OPEN, MIRROR), W, 2, scheme="pressure_energy", conductivity=APPROACH),
 ]
 
 
@@ -208,6 +228,9 @@ def run_engine(case, gas, skin, threads):
     assert not search.stale(gas.position, gas.support)
     # what a pass forgets to write stays NaN and is seen
     fields = passes.Fields(*np.full((5, count), np.nan))
+    summed = None
+    if schemes.sums_pressure(case.models.scheme):
+        summed = passes.SummedPressure(*np.full((2, count), np.nan))
     div_v = np.full(count, np.nan) if case.balsara or case.evolves else None
     curl_v = np.full(count, np.nan) if case.balsara and case.dimension > 1 else None
     f = np.full(count, np.nan) if case.balsara else None
@@ -218,26 +241,23 @@ def run_engine(case, gas, skin, threads):
         if wanted.max() > 0:
             search.widen(gas.position, wanted, identity)
         pass_over(
-            density.density, team, case, gas, search, fields, div_v, curl_v, f, alpha_rate, wanted
-        )
+            density.density, team, case, gas, search, fields, summed, div_v, curl_v, f, alpha_rate,
+            wanted,
+        )  # fmt: skip
         widenings += 1
     acceleration = np.full(gas.position.shape, np.nan)
     energy_rate, signal_speed = np.full((2, count), np.nan)
+    conducted = gas.energy if case.conductivity else None
     pass_over(
-        rates.rates,
-        team,
-        case,
-        gas,
-        search,
-        fields,
-        f,
-        None,
-        acceleration,
-        energy_rate,
-        signal_speed,
-    )
+        rates.rates, team, case, gas, search, fields, summed, f, conducted, acceleration,
+        energy_rate, signal_speed,
+    )  # fmt: skip
     team.close()
-    found = fields._asdict() | {
+    found = fields._asdict()
+    found["pressure"] = found.pop("pressure_term") * found["omega"] * found["density"] ** 2
+    if summed is not None:
+        found["pressure"] = summed.pressure
+    found |= {
         "divergence": div_v,
         "curl": curl_v,
         "balsara": f,
@@ -271,7 +291,6 @@ def test_every_rate_is_that_of_the_equations(case, lists):
     # and the lists too: where they fall short, each of three passes asks for no more than one more
     assert widenings in ((1, 2, 3) if lists == "widened" else (0,))
 
-    found["pressure"] = found.pop("pressure_term") * found["omega"] * found["density"] ** 2
     for name, values in found.items():
         error = abs(values - getattr(expected, name))
         scale = getattr(expected, f"{name}_scale")
@@ -325,7 +344,11 @@ def simulate(case, gas, end, threads=1):
         given=gas,
     )
     alpha = config.AlphaRange(**case.alpha) if case.evolves else case.alpha
-    physics = config.Physics(gamma=1.4, alpha=alpha, eta=case.eta, density_passes=case.passes)
+    name, strength = case.conductivity or (None, None)
+    physics = config.Physics(
+        gamma=1.4, alpha=alpha, eta=case.eta, density_passes=case.passes, scheme=case.scheme,
+        conductivity=name and {"name": name, "strength": strength},
+    )  # fmt: skip
     whole = config.Config(
         problem, physics, config.Time(end=end), config.Output(interval=end), config.Run()
     )
@@ -344,6 +367,7 @@ def simulate(case, gas, end, threads=1):
 TRAJECTORIES = [
     (Case((MIRROR,), W, 2, alpha=1.5), (70,), 0.05),
     (Case((PERIODIC, MIRROR), W, 2, alpha=SWITCHED), (11, 11), 0.1),
+    (Case((PERIODIC,), W, 2, scheme="pressure_energy", conductivity=JUMP), (70,), 0.05),
 ]
 
 

@@ -1,0 +1,111 @@
+"""The comparison itself: lines of runs that differ in N, the front, and fitted orders."""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from sph.analysis.report import front
+from sph.analysis.report.runs import Row, natural, varied_keys
+
+RESOLUTION = "problem.n"
+
+# What a cost is called: in a sentence, as a column, and its unit.
+COSTS = {
+    "cpu": ("CPU time", "CPU s", "s"),
+    "wall": ("wall-clock time", "wall s", "s"),
+    "updates": ("particle updates", "updates", ""),
+    "n": ("number of particles", "N", ""),
+}
+
+
+class Question(NamedTuple):
+    """What a report is to compare."""
+
+    field: str = "density"  # of the errors, or table.name of a figure of the summary
+    norm: str = "L1"
+    cost: str = "cpu"  # a key of COSTS
+    by: tuple[str, ...] = ()  # keys that tell lines apart; all that vary but N if empty
+    reference: Path | None = None  # the run that errors are taken against, if one is
+
+    @property
+    def error_name(self) -> str:
+        return self.field if "." in self.field else f"{self.norm} of {self.field}"
+
+
+class Series(NamedTuple):
+    """Runs with errors that share their settings but N, in order of N: one line of a picture."""
+
+    label: str
+    group: str  # lines of one group, by --by, have one colour
+    members: tuple[int, ...]  # indices into the report's compared rows
+    order: float | None  # p of error ~ spacing^p, spacing ~ N^(-1/D)
+    exponent: float | None  # of error ~ cost^exponent
+
+
+class Report(NamedTuple):
+    """Runs with an error, in order of their series, and those without one."""
+
+    question: Question
+    keys: list[str]  # what varies
+    rows: list[Row]
+    error: np.ndarray  # (M,)
+    cost: np.ndarray  # (M,)
+    on_front: np.ndarray  # (M,) mask
+    excess: np.ndarray  # (M,) cost over the front's at the same error
+    series: list[Series]
+    without: list[Row]
+
+
+def compare(rows: Sequence[Row], question: Question) -> Report:
+    """The report on these runs."""
+    errors = {id(row): row.error(question.field, question.norm) for row in rows}
+    is_compared = {id(row): row.status == "done" and errors[id(row)] is not None for row in rows}
+    keys = varied_keys([row for row in rows if row.settings])
+    lines, groups = _line_keys(keys, question.by)
+    compared = sorted((row for row in rows if is_compared[id(row)]), key=lambda row: row.n)
+    members: dict[tuple[str, ...], list[Row]] = {}
+    for row in compared:
+        members.setdefault(_values(row, lines), []).append(row)
+    found = [members[values] for values in sorted(members, key=lambda one: [*map(natural, one)])]
+    ordered = [row for line in found for row in line]
+    error = np.array([errors[id(row)] for row in ordered])
+    cost = np.array([row.cost[question.cost] for row in ordered], dtype=float)
+    series, start = [], 0
+    for line in found:
+        which = np.arange(start, start := start + len(line))
+        label, group = _label(line[0], lines), _label(line[0], groups)
+        series.append(_series(label, group, which, line, error, cost))
+    without = [row for row in rows if not is_compared[id(row)]]
+    best, excess = front.on_front(cost, error), front.excess(cost, error)
+    return Report(question, keys, ordered, error, cost, best, excess, series, without)
+
+
+def _line_keys(keys: list[str], by: Sequence[str]) -> tuple[list[str], list[str]]:
+    """Keys that tell lines apart, and those that tell their colours apart."""
+    if RESOLUTION in by:
+        return list(by), list(by)
+    lines = [key for key in keys if key != RESOLUTION]
+    return [*lines, *(key for key in by if key not in lines)], list(by) or lines
+
+
+def _values(row: Row, keys: Sequence[str]) -> tuple[str, ...]:
+    return tuple(row.value(key) for key in keys)
+
+
+def _label(row: Row, keys: Sequence[str]) -> str:
+    """Settings without their tables, e.g. alpha = 1.0."""
+    names = {key: "problem" if key == "problem.name" else key.rpartition(".")[2] for key in keys}
+    return ", ".join(f"{name} = {row.value(key)}" for key, name in names.items())
+
+
+def _series(label, group, which, line, error, cost) -> Series:
+    number = np.array([row.n for row in line], dtype=float)
+    by_number = front.slope(number, error[which])
+    dimensions = {row.summary["dimension"] for row in line}
+    order = None
+    if by_number is not None and len(dimensions) == 1:
+        order = -by_number * dimensions.pop()
+    exponent = front.slope(cost[which], error[which])
+    return Series(label, group, tuple(which.tolist()), order, exponent)

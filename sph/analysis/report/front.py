@@ -1,0 +1,46 @@
+"""Which runs are the cheapest at their error, by how much others are not, and how fast errors fall.
+
+Everything here works on arrays of positive costs and errors of one kind, one entry a run.
+"""
+
+import numpy as np
+
+
+def on_front(cost: np.ndarray, error: np.ndarray) -> np.ndarray:
+    """(M,) mask of the Pareto front: no other run is better in one and as good in the other."""
+    cheaper = cost[None, :] < cost[:, None]
+    as_cheap = cost[None, :] <= cost[:, None]
+    better = error[None, :] < error[:, None]
+    as_good = error[None, :] <= error[:, None]
+    return ~((cheaper & as_good) | (as_cheap & better)).any(axis=1)
+
+
+def cost_at(error: float, front_cost: np.ndarray, front_error: np.ndarray) -> float:
+    """What the front takes for `error`, between its runs along straight lines of the logarithms.
+
+    An error above all of the front's takes its cheapest run: what less accuracy would cost is not
+    known, and this is an upper bound of it. Raises ValueError for an error below all of them.
+    """
+    if error < front_error.min():
+        raise ValueError(f"the front does not reach an error of {error}")
+    order = np.argsort(front_error)
+    log_cost = np.interp(np.log(error), np.log(front_error[order]), np.log(front_cost[order]))
+    return float(np.exp(log_cost))
+
+
+def excess(cost: np.ndarray, error: np.ndarray) -> np.ndarray:
+    """(M,) cost of each run over the front's at the same error: 1 on the front, at least 1 off it.
+
+    It is 1 off the front too where a run is as cheap as the cheapest one there, and less accurate.
+    """
+    front = on_front(cost, error)
+    equal = [cost_at(one, cost[front], error[front]) for one in error]
+    return np.where(front, 1.0, cost / np.array(equal, dtype=float))
+
+
+def slope(x: np.ndarray, y: np.ndarray) -> float | None:
+    """Exponent p of y ~ x^p by least squares of the logarithms; None where all x are one."""
+    if np.unique(x).size < 2:
+        return None
+    offset = np.log(x) - np.log(x).mean()
+    return float(offset @ np.log(y) / (offset @ offset))

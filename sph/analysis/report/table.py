@@ -1,0 +1,120 @@
+"""The table of a report: for the terminal, as CSV, JSON and Markdown."""
+
+import csv
+import io
+import json
+from collections.abc import Sequence
+
+from sph.analysis.report.compare import COSTS, RESOLUTION, Report
+from sph.analysis.report.runs import Row
+
+NORMS = ("L1", "L2", "Linf")
+
+
+def as_text(report: Report) -> str:
+    """Columns in line, for a terminal."""
+    header, *lines = _cells(report)
+    widths = [max(map(len, column)) for column in zip(header, *lines, strict=True)]
+    return "\n".join(
+        "  ".join(f"{cell:>{width}}" for cell, width in zip(line, widths, strict=True))
+        for line in (header, *lines)
+    )
+
+
+def as_markdown(report: Report, sentences: Sequence[str], pictures: Sequence[str]) -> str:
+    """The table, the words, and the pictures that lie beside it."""
+    header, *lines = _cells(report)
+    rule = ["---:"] * len(header)
+    rows = ["| " + " | ".join(line) + " |" for line in (header, rule, *lines)]
+    said = [f"- {sentence}" for sentence in sentences]
+    shown = [f"![{name.removesuffix('.png').replace('_', ' ')}]({name})" for name in pictures]
+    title = f"# Error ({report.question.error_name}) against {COSTS[report.question.cost][0]}"
+    return "\n\n".join([title, "\n".join(rows), "\n".join(said), *shown]) + "\n"
+
+
+def as_csv(report: Report) -> str:
+    """A line a run, with all norms of all fields and all figures of its summary."""
+    records = _records(report)
+    columns = dict.fromkeys(name for record in records for name in record)
+    text = io.StringIO()
+    writer = csv.DictWriter(text, list(columns), lineterminator="\n")
+    writer.writeheader()
+    writer.writerows(records)
+    return text.getvalue()
+
+
+def as_json(report: Report, sentences: Sequence[str]) -> str:
+    """The question, the runs, the lines with their fits, and the words."""
+    runs = [row.name for row in report.rows]
+    reference = report.question.reference
+    series = [
+        {
+            "label": line.label,
+            "runs": [runs[i] for i in line.members],
+            "order": line.order,
+            "exponent": line.exponent,
+        }
+        for line in report.series
+    ]
+    content = {
+        "question": report.question._asdict() | {"reference": reference and str(reference)},
+        "varied": report.keys,
+        "runs": _records(report),
+        "series": series,
+        "words": list(sentences),
+    }
+    return json.dumps(content, indent=2, ensure_ascii=False) + "\n"
+
+
+def _cells(report: Report) -> list[list[str]]:
+    """Header and lines of what is shown."""
+    shown = [key for key in report.keys if key != RESOLUTION]
+    question = report.question
+    header = [*shown, "N", "steps"]
+    header += [] if question.cost == "n" else [COSTS[question.cost][1]]
+    header += [question.error_name, "energy drift", "against the front"]
+    lines = []
+    for i, row in enumerate(report.rows):
+        line = [*(row.value(key) for key in shown), str(row.n), str(row.steps)]
+        line += [] if question.cost == "n" else [f"{report.cost[i]:.3g}"]
+        drift = row.summary["conservation"]["energy_drift_max"]
+        drifted = f"{drift:.1e}" if isinstance(drift, float) else str(drift)
+        against = "front" if report.on_front[i] else f"× {report.excess[i]:.2f}"
+        lines.append([*line, f"{report.error[i]:.3g}", drifted, against])
+    return [header, *lines]
+
+
+def _records(report: Report) -> list[dict]:
+    """All there is of every run, also of those without an error, by column."""
+    found = zip(
+        report.error.tolist(), report.excess.tolist(), report.on_front.tolist(), strict=True
+    )
+    compared = [
+        _record(report, row) | dict(zip(("error", "excess", "on_front"), one, strict=True))
+        for row, one in zip(report.rows, found, strict=True)
+    ]
+    return [*compared, *(_record(report, row) for row in report.without)]
+
+
+def _record(report: Report, row: Row) -> dict:
+    record = {"run": row.name, "status": row.status, "reason": row.reason}
+    record |= {key: row.value(key) for key in report.keys}
+    if not row.summary:
+        return record
+    cost = row.summary["cost"]
+    record |= {
+        "particles": row.n,
+        "steps": row.steps,
+        "updates": row.cost["updates"],
+        "cpu_seconds": row.cost["cpu"],
+        "wall_seconds": row.cost["wall"],
+        "compile_cpu_seconds": cost["session"]["compile_cpu_seconds"],
+        "threads": cost["threads"],
+    }
+    for name in row.figures():
+        if "." in name:
+            table, key = name.split(".")
+            record[name] = row.summary[table][key]
+        else:
+            record |= {f"{name}.{norm}": row.error(name, norm) for norm in NORMS}
+    return record

@@ -1,0 +1,98 @@
+"""What a report says in sentences."""
+
+import numpy as np
+
+from sph.analysis.report.compare import COSTS, Report, Series
+from sph.analysis.report.runs import STARTING, Row
+
+# CPU times of equal runs differ by some per cent, more on a machine that is shared.
+LEVEL = 1.1
+
+
+def sentences(report: Report) -> list[str]:
+    """How errors fall, what is on the front, what is dominated by how much, and what to know."""
+    said = [_costs(report)]
+    if report.rows:
+        said += [_order(line) for line in report.series if line.order is not None]
+        said.append(_front(report))
+        said += [
+            _standing(report, line) for line in report.series if not _is_all_front(report, line)
+        ]
+    said += [f"Without an error: {row.name} ({_reason(report, row)})." for row in report.without]
+    return said + _warnings(report)
+
+
+def _costs(report: Report) -> str:
+    question = report.question
+    named = question.reference
+    against = f" against the run {named.resolve().name}" if named is not None else ""
+    text = f"The error is {question.error_name}{against}, weighed with {COSTS[question.cost][0]}"
+    if question.cost in ("cpu", "wall"):
+        text += f" without compilation and {STARTING.replace('start', 'the start')}"
+    return text + "."
+
+
+def _order(line: Series) -> str:
+    fall = f", so error ∝ cost^{line.exponent:.2f}" if line.exponent is not None else ""
+    return f"{_name(line)}: order {line.order:.2f} in the particle spacing{fall}."
+
+
+def _front(report: Report) -> str:
+    parts = []
+    for line in report.series:
+        members = [i for i in line.members if report.on_front[i]]
+        if members:
+            parts.append(f"{_name(line)} at {_resolutions(report, members)}")
+    return f"On the front: {'; '.join(parts)}." if parts else ""
+
+
+def _standing(report: Report, line: Series) -> str:
+    """How far a line is from the front where it is not on it."""
+    off = [i for i in line.members if not report.on_front[i]]
+    factors = report.excess[off]
+    never = len(off) == len(line.members)
+    where = "is never on the front" if never else f"is off the front at {_resolutions(report, off)}"
+    what = COSTS[report.question.cost][0]
+    if factors.max() < LEVEL:
+        return f"{_name(line)} {where}, but within {LEVEL - 1:.0%} of it."
+    low, high = (f"{value:.2g}" for value in (factors.min(), factors.max()))
+    times = f"{low} times" if low == high else f"{low} to {high} times"
+    times = f"up to {high} times" if low == "1" and low != high else times
+    front_error = report.error[report.on_front]
+    bound = "at least " if np.all(report.error[off] > front_error.max()) else ""
+    return f"{_name(line)} {where}: {bound}{times} the {what} of the front at equal error."
+
+
+def _warnings(report: Report) -> list[str]:
+    said = []
+    restarted = [row.name for row in report.rows if row.is_restarted]
+    if restarted and report.question.cost in ("cpu", "wall"):
+        said.append(
+            f"Restarted, so their time includes what their first sessions took to start: "
+            f"{', '.join(restarted)}."
+        )
+    different = [key for key in ("problem.name", "problem.dimension", "time.end")
+                 if key in report.keys]  # fmt: skip
+    if different:
+        said.append(f"These are different tasks ({', '.join(different)}): one front for all is "
+                    "to be read with care.")  # fmt: skip
+    return said
+
+
+def _name(line: Series) -> str:
+    return line.label or "These runs"
+
+
+def _resolutions(report: Report, members: list[int]) -> str:
+    numbers = [str(report.rows[i].n) for i in members]
+    return f"N = {', '.join(numbers)}"
+
+
+def _is_all_front(report: Report, line: Series) -> bool:
+    return all(report.on_front[i] for i in line.members)
+
+
+def _reason(report: Report, row: Row) -> str:
+    if row.status == "done":
+        return f"it has no {report.question.error_name}"
+    return ": ".join(filter(None, [row.status, row.reason.partition("\n")[0]]))

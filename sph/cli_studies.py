@@ -1,0 +1,62 @@
+"""The commands over many runs: `sph sweep` and `sph report`."""
+
+from pathlib import Path
+
+import click
+
+
+@click.command()
+@click.argument("config", type=click.Path(path_type=Path))
+@click.option("--vary", "varies", multiple=True, required=True, metavar="KEY=A,B,…",
+              help="Values of a key, e.g. physics.alpha=0.5,1.0 or problem.n=100:1600:x2 or "
+              "physics.C=0.05:0.3:+0.05; may be repeated.")  # fmt: skip
+@click.option("--set", "overrides", multiple=True, metavar="KEY=VALUE",
+              help="Set a key for all points; may be repeated.")  # fmt: skip
+@click.option("-o", "directory", type=click.Path(path_type=Path), metavar="DIR",
+              help="Where the runs go; runs/<name of CONFIG>-sweep if not given.")  # fmt: skip
+@click.option("--jobs", type=click.IntRange(min=1), metavar="N",
+              help="Points at once; as many as there are processors if not given.")  # fmt: skip
+@click.option("--scheduler", metavar="ADDRESS",
+              help="Run on a Dask scheduler, e.g. tcp://127.0.0.1:8786.")  # fmt: skip
+@click.option("--slurm", multiple=True, metavar="KEY=VALUE",
+              help="Run as Slurm jobs, with this option of submitit, e.g. timeout_min=60 or "
+              "partition=short; may be repeated.")  # fmt: skip
+def sweep(config, varies, overrides, directory, jobs, scheduler, slurm):
+    """Run CONFIG at every combination of the values, each a run directory in DIR.
+
+    Run again, it does only what is missing or failed, and goes on with what was interrupted.
+    """
+    from sph.sweep import command
+
+    target = directory or Path("runs") / f"{config.stem}-sweep"
+    click.echo(command.run(config, varies, overrides, target, jobs, scheduler, slurm))
+    click.echo(f"Results: {target} (`sph report {target}` compares them).")
+
+
+@click.command()
+@click.argument("sources", metavar="DIR...", nargs=-1, required=True,
+                type=click.Path(path_type=Path))  # fmt: skip
+@click.option("--field", default="density", show_default=True, metavar="NAME",
+              help="A field, or a figure of the summary such as report.NAME.")  # fmt: skip
+@click.option("--norm", type=click.Choice(["L1", "L2", "Linf"]), default="L1", show_default=True)
+@click.option("--x", "cost", type=click.Choice(["cpu", "wall", "updates", "n"]), default="cpu",
+              show_default=True, help="What the error is drawn and weighed against.")  # fmt: skip
+@click.option("--by", multiple=True, metavar="KEY",
+              help="Tell lines apart by this key; all keys that vary if not given.")  # fmt: skip
+@click.option("--reference", type=click.Path(path_type=Path), metavar="DIR",
+              help="Take errors against this run, a finer one.")  # fmt: skip
+@click.option("-o", "directory", type=click.Path(path_type=Path), metavar="DIR",
+              help="Where all goes; report/ in the first DIR if not given.")  # fmt: skip
+def report(sources, field, norm, cost, by, reference, directory):
+    """Compare runs, or the runs in a directory: error against what it cost.
+
+    Says which settings are the fastest at their error, and by how much the others are slower.
+    """
+    from sph.analysis import report as reports
+
+    question = reports.Question(field, norm, cost, by, reference)
+    target = directory or sources[0] / "report"
+    found = reports.make(sources, question)
+    click.echo(reports.in_words(found))
+    for path in reports.write(found, target):
+        click.echo(f"wrote {path}")

@@ -1,0 +1,84 @@
+"""A sweep from its command line to its closing words."""
+
+import sys
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+from sph.errors import ConfigError, NumericalError, Stopped
+from sph.sweep import distributed, local, slurm
+from sph.sweep.manifest import SweepDirectory
+from sph.sweep.plan import Plan
+from sph.sweep.task import Outcome, Task, tasks
+
+MARKS = {"done": "done", "failed": "FAILED", "stopped": "stopped"}
+
+
+def run(
+    config: Path,
+    varies: Sequence[str],
+    overrides: Sequence[str],
+    directory: Path,
+    jobs: int | None = None,
+    scheduler: str | None = None,
+    slurm_options: Sequence[str] = (),
+) -> str:
+    """Bring all points of a sweep to their end; returns the closing words.
+
+    Raises ConfigError and FileError before anything runs; NumericalError where a point failed and
+    Stopped where one was stopped, after all others have run.
+    """
+    if scheduler and slurm_options:
+        raise ConfigError("--scheduler and --slurm: a sweep runs at one of the two")
+    plan = Plan.of(varies, overrides)
+    sweep = SweepDirectory(directory.absolute())
+    sweep.prepare(config, plan)
+    everything = tasks(sweep, plan)
+    missing = [task for task in everything if task.status != "done"]
+    told = _Told(len(everything), len(everything) - len(missing))
+    _runner(jobs, scheduler, slurm_options)(missing, told)
+    return told.closing()
+
+
+def _runner(jobs, scheduler, options) -> Callable[[Sequence[Task], Callable], None]:
+    if scheduler:
+        return lambda missing, tell: distributed.run(missing, scheduler, tell)
+    if options:
+        return lambda missing, tell: slurm.run(missing, options, jobs, tell)
+    return lambda missing, tell: local.run(missing, jobs, tell)
+
+
+class _Told:
+    """A line for each point that ends, and the closing words."""
+
+    def __init__(self, points: int, before: int):
+        self.points, self.before = points, before
+        self.outcomes: list[Outcome] = []
+        if before:
+            self._say(f"{before} of {points} points are done already")
+
+    def __call__(self, outcome: Outcome) -> None:
+        self.outcomes.append(outcome)
+        ended = self.before + len(self.outcomes)
+        how = ", restarted from its last checkpoint" if outcome.how == "restart" else ""
+        reason = f": {outcome.reason}" if outcome.reason else ""
+        status = MARKS[outcome.status]
+        width = len(str(self.points))
+        self._say(f"[{ended:{width}d}/{self.points}] {outcome.name} {status}{how}{reason}")
+
+    def closing(self) -> str:
+        """Raises NumericalError or Stopped where not all points are done."""
+        lists = {status: [one for one in self.outcomes if one.status == status] for status in MARKS}
+        done = f"{self.before + len(lists['done'])} of {self.points} points are done"
+        if lists["failed"]:
+            reasons = "".join(f"\n  {one.name}: {_first_line(one)}" for one in lists["failed"])
+            raise NumericalError(f"{done}, {len(lists['failed'])} failed:{reasons}")
+        if lists["stopped"]:
+            raise Stopped(f"{done}; the same command goes on with the rest.")
+        return f"{done}."
+
+    def _say(self, line: str) -> None:
+        print(line, file=sys.stderr, flush=True)
+
+
+def _first_line(outcome: Outcome) -> str:
+    return outcome.reason.partition("\n")[0]

@@ -1,0 +1,164 @@
+"""The directory of a sweep: what it is of, and the runs in it.
+
+    base.toml    the configuration as it was given
+    sweep.toml   what was set and varied, and the points by name
+    logs/        a log for each point, and the reason why its last attempt failed
+    <point>/     a run directory
+
+What has been done is not written here: each run directory tells that itself.
+"""
+
+import tomllib
+from dataclasses import dataclass
+from pathlib import Path
+
+from sph import config as configuration
+from sph.config import Config, reading
+from sph.config.toml_text import key_text, value_text
+from sph.errors import ConfigError, FileError
+from sph.output.files import explained, write_text
+from sph.output.run_directory import RunDirectory
+from sph.sweep.plan import Plan, Point
+from sph.version import __version__
+
+HEADER = "# A sweep of sph: base.toml with these keys varied. Each point is a run directory.\n\n"
+OTHER_DIRECTORY = "Try: another directory, with -o."
+
+
+@dataclass(frozen=True)
+class SweepDirectory:
+    """Paths in the directory of a sweep."""
+
+    path: Path
+
+    @property
+    def base(self) -> Path:
+        return self.path / "base.toml"
+
+    @property
+    def manifest(self) -> Path:
+        return self.path / "sweep.toml"
+
+    @property
+    def logs(self) -> Path:
+        return self.path / "logs"
+
+    @property
+    def is_one(self) -> bool:
+        return self.manifest.is_file()
+
+    def plan(self) -> Plan:
+        """The plan in sweep.toml. Raises FileError where there is none that can be read."""
+        try:
+            found = tomllib.loads(self.manifest.read_text(encoding="utf-8"))
+            points = tuple(Point(name, tuple(found["points"][name])) for name in found["points"])
+            return Plan(tuple(found["set"]), found["vary"], points)
+        except OSError as error:
+            raise FileError(f"{self.manifest} cannot be read: {error.strerror}") from None
+        except (ValueError, KeyError, TypeError, AttributeError):
+            raise FileError(
+                f"{self.manifest} is not the manifest of a sweep.\n{OTHER_DIRECTORY}"
+            ) from None
+
+    def prepare(self, config: Path, plan: Plan) -> None:
+        """Make this the directory of that sweep, or check that it is and note added points.
+
+        Raises ConfigError where a point is wrong, or is not what this directory has under its
+        name; FileError where it holds other things or cannot be written. Then nothing is changed.
+        """
+        resolved = plan.resolved(config)
+        with explained(f"cannot write to {self.path}"):
+            if self.is_one:
+                plan = self._extended(plan, resolved)
+            elif self.path.exists():
+                self._refuse_other_things()
+            self._refuse_other_runs(resolved)
+            self.logs.mkdir(parents=True, exist_ok=True)
+        if not self.is_one:
+            write_text(self.base, reading.read(config))
+        write_text(self.manifest, _text(plan))
+
+    def failures(self) -> dict[str, str]:
+        """Reasons of points whose last attempt failed, by name."""
+        found = sorted(self.logs.glob("*.failed"))
+        return {path.stem: path.read_text(encoding="utf-8").strip() for path in found}
+
+    def _extended(self, plan: Plan, resolved: dict[str, Config]) -> Plan:
+        """The plan that is here and what the new one adds. Raises ConfigError if they differ."""
+        before = self.plan()
+        if list(before.varied) != list(plan.varied):
+            raise ConfigError(
+                f"{self.path} holds a sweep over {', '.join(before.varied) or 'nothing'}, not over "
+                f"{', '.join(plan.varied) or 'nothing'}.\n{OTHER_DIRECTORY}"
+            )
+        for point in plan.points:
+            try:
+                overrides = (*before.overrides, *point.settings)
+                there = configuration.load(self.base, overrides)
+            except ConfigError:
+                there = None
+            _refuse_change(f"{self.path} holds a sweep", there, resolved[point.name])
+        varied = {key: _union(before.varied[key], plan.varied[key]) for key in plan.varied}
+        return Plan(before.overrides, varied, _union(before.points, plan.points))
+
+    def _refuse_other_runs(self, resolved: dict[str, Config]) -> None:
+        """Raise ConfigError where a point's directory holds a run of another configuration."""
+        for name, config in resolved.items():
+            run = RunDirectory(self.path / name)
+            if run.config.is_file() and (run.summary.is_file() or has_checkpoints(run)):
+                there = configuration.load(run.config)
+                _refuse_change(f"{run.path} holds a run", there, config)
+
+    def _refuse_other_things(self) -> None:
+        if not self.path.is_dir() or any(self.path.iterdir()):
+            raise FileError(
+                f"{self.path} is there already, and is not the directory of a sweep.\n"
+                f"{OTHER_DIRECTORY}"
+            )
+
+
+def has_checkpoints(run: RunDirectory) -> bool:
+    """Whether there is a run directory with a checkpoint, good or not."""
+    try:
+        return bool(run.checkpoints())
+    except FileNotFoundError:
+        return False
+
+
+def _refuse_change(what: str, there: Config | None, now: Config) -> None:
+    """Raise ConfigError, with the keys that differ. How a run is carried out may differ."""
+    if there is not None and there.to_toml(include_run=False) == now.to_toml(include_run=False):
+        return
+    differences = [] if there is None else _differences(there, now)
+    told = "".join(f"\n  {line}" for line in differences)
+    raise ConfigError(f"{what} of another configuration{':' if told else '.'}{told}\n"
+                      f"{OTHER_DIRECTORY}")  # fmt: skip
+
+
+def _differences(there: Config, now: Config) -> list[str]:
+    before, after = (tomllib.loads(one.to_toml(include_run=False)) for one in (there, now))
+    return [
+        f"{table}.{key} = {before[table].get(key)} there, {after[table].get(key)} now"
+        for table in before
+        for key in before[table] | after[table]
+        if before[table].get(key) != after[table].get(key)
+    ]
+
+
+def _text(plan: Plan) -> str:
+    tables = {
+        "vary": plan.varied,
+        "points": {point.name: list(point.settings) for point in plan.points},
+    }
+    text = (
+        f"{HEADER}version = {value_text(__version__)}\nset = {value_text(list(plan.overrides))}\n"
+    )
+    for table, keys in tables.items():
+        lines = (f"{key_text(key)} = {value_text(value)}\n" for key, value in keys.items())
+        text += f"\n[{table}]\n" + "".join(lines)
+    return text
+
+
+def _union(before, after):
+    """What is in `before`, then what only `after` has; of the same type."""
+    return type(before)([*before, *(one for one in after if one not in before)])

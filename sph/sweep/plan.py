@@ -1,0 +1,186 @@
+"""What a sweep runs: `--vary` read, ranges written out, and their product."""
+
+import hashlib
+import itertools
+import math
+import re
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from sph import config as configuration
+from sph.errors import ConfigError
+
+_NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
+_RANGE = re.compile(rf"({_NUMBER}):({_NUMBER}):(x|\+|-)(\d.*|\.\d.*)")
+RANGE_FORM = "FIRST:LAST:xFACTOR, FIRST:LAST:+STEP or FIRST:LAST:-STEP"
+
+# An end within this share of a step is met: 0.05 + 5 x 0.05 is not 0.3 in binary numbers.
+ROUNDING = 1e-6
+MOST_VALUES = 10_000  # of one key: more is a slip of the keyboard
+
+# File systems take 255 bytes; a name must also be readable in a table.
+LONGEST_NAME = 100
+
+
+@dataclass(frozen=True)
+class Point:
+    """One run: the name of its directory, and `key=value` for each key that is varied."""
+
+    name: str
+    settings: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Plan:
+    """The settings that all points share, the values of each varied key, and the points."""
+
+    overrides: tuple[str, ...]
+    varied: dict[str, list[str]]
+    points: tuple[Point, ...]
+
+    @classmethod
+    def of(cls, varies: Sequence[str], overrides: Sequence[str] = ()) -> "Plan":
+        """The product of `key=a,b,c` texts, the last key running fastest. Raises ConfigError."""
+        varied: dict[str, list[str]] = {}
+        for text in varies:
+            key, values = _varied(text)
+            if key in varied:
+                raise ConfigError(f"--vary {text}: {key} is varied already; give all its values")
+            varied[key] = values
+        return cls(tuple(overrides), varied, _points(varied))
+
+    def resolved(self, config: Path) -> dict[str, configuration.Config]:
+        """The valid configuration of every point, by its name.
+
+        Raises FileError for `config`, and ConfigError with all that is wrong with any point.
+        """
+        found, wrong = {}, {}
+        for point in self.points:
+            try:
+                overrides = (*self.overrides, *point.settings)
+                found[point.name] = configuration.load(config, overrides)
+            except ConfigError as error:
+                for line in _as_varied(str(error), point).splitlines():
+                    wrong.setdefault(line, []).append(point.name)
+        if wrong:
+            raise ConfigError("\n".join(self._told(*item) for item in wrong.items()))
+        return found
+
+    def _told(self, line: str, names: list[str]) -> str:
+        """A thing that is wrong and, where it is not so for all, for which points."""
+        if len(names) == len(self.points) or "--vary" in line:
+            return line
+        more = f" and {len(names) - 1} more" if len(names) > 1 else ""
+        return f"{line} (at {names[0]}{more})"
+
+
+def _varied(text: str) -> tuple[str, list[str]]:
+    key, equals, values = text.partition("=")
+    key = key.strip()
+    if not equals or "." not in key or not all(key.split(".")):
+        raise ConfigError(f"--vary {text}: expected TABLE.KEY=VALUE,VALUE,…")
+    found = [value for part in split(values) for value in expand(part)]
+    if not all(found):
+        raise ConfigError(f"--vary {text}: a value is empty; expected VALUE,VALUE,…")
+    twice = [value for value, count in Counter(found).items() if count > 1]
+    if twice:
+        raise ConfigError(f"--vary {text}: {twice[0]} stands there twice")
+    return key, found
+
+
+def _as_varied(message: str, point: Point) -> str:
+    """An error in the words of `--vary`, where it comes from a value of it."""
+    for setting in point.settings:
+        message = message.replace(f"--set {setting}:", f"--vary {setting}:")
+    return message
+
+
+# --- values -----------------------------------------------------------------------------------
+
+
+def split(text: str) -> list[str]:
+    """Parts of `text` between commas that stand in no bracket, brace or quotation."""
+    parts, depth, quote = [""], 0, ""
+    for letter in text:
+        if quote:
+            quote = "" if letter == quote else quote
+        elif letter in "\"'":
+            quote = letter
+        else:
+            depth += (letter in "[{") - (letter in "]}")
+        if letter == "," and depth == 0 and not quote:
+            parts.append("")
+        else:
+            parts[-1] += letter
+    return [part.strip() for part in parts]
+
+
+def expand(text: str) -> list[str]:
+    """The values of a range, as TOML, or `text` itself where it is none. Raises ConfigError."""
+    form = _RANGE.fullmatch(text)
+    if not form:
+        return [text]
+    first, last, kind, by = form[1], form[2], form[3], form[4]
+    if not re.fullmatch(_NUMBER, by):
+        raise ConfigError(f"{text}: {by} is not a number; expected {RANGE_FORM}")
+    progression = _geometric if kind == "x" else _arithmetic
+    signed = float(by) * (-1.0 if kind == "-" else 1.0)
+    values = progression(text, float(first), float(last), signed)
+    # Digits that rounding did not touch. A whole number stays one if the range begins with one.
+    values = [float(f"{value:.12g}") for value in values]
+    is_whole = re.fullmatch(r"[+-]?\d+", first) and all(value.is_integer() for value in values)
+    return [str(int(value)) if is_whole else repr(value) for value in values]
+
+
+def _geometric(text: str, first: float, last: float, factor: float) -> list[float]:
+    if min(first, last, factor) <= 0.0 or factor == 1.0:
+        raise ConfigError(f"{text}: a factor other than 1 and ends above 0 are expected")
+    steps = _steps(text, math.log(last / first) / math.log(factor))
+    return [first * factor**k for k in range(steps + 1)]
+
+
+def _arithmetic(text: str, first: float, last: float, step: float) -> list[float]:
+    if step == 0.0:
+        raise ConfigError(f"{text}: a step of 0 leads nowhere")
+    return [first + k * step for k in range(_steps(text, (last - first) / step) + 1)]
+
+
+def _steps(text: str, ratio: float) -> int:
+    """Whole steps from the first to the last value."""
+    if ratio < -ROUNDING:
+        raise ConfigError(f"{text}: this leads away from the last value; expected {RANGE_FORM}")
+    if ratio > MOST_VALUES:
+        raise ConfigError(f"{text}: these are more than {MOST_VALUES} values")
+    return math.floor(ratio + ROUNDING)
+
+
+# --- names ------------------------------------------------------------------------------------
+
+
+def _points(varied: dict[str, list[str]]) -> tuple[Point, ...]:
+    products = itertools.product(*([f"{key}={value}" for value in varied[key]] for key in varied))
+    settings = list(products)
+    plain = [_name(one) for one in settings]
+    count = Counter(name.casefold() for name in plain)
+    names = [
+        _unique(name, one) if count[name.casefold()] > 1 else name
+        for name, one in zip(plain, settings, strict=True)
+    ]
+    return tuple(Point(*pair) for pair in zip(names, settings, strict=True))
+
+
+def _name(settings: tuple[str, ...]) -> str:
+    """A readable name that is safe on every file system, e.g. problem.n=100,physics.alpha=2.0."""
+    if not settings:
+        return "run"
+    text = ",".join(re.sub(r"[\s\"'{}\[\]]+", "", one) for one in settings)
+    name = re.sub(r"[^\w.,=+-]+", "_", text, flags=re.ASCII)
+    return name if len(name) <= LONGEST_NAME else _unique(name, settings)
+
+
+def _unique(name: str, settings: tuple[str, ...]) -> str:
+    """`name`, shortened, with a hash of what it stands for."""
+    digest = hashlib.sha256("\n".join(settings).encode()).hexdigest()[:8]
+    return f"{name[: LONGEST_NAME - 9]}-{digest}"

@@ -1,0 +1,164 @@
+"""Errors against a finer run: its fields carried by its kernels, and what does not fit."""
+
+import json
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+from sph import config as configuration
+from sph import runner
+from sph.analysis.reference import Reference, at_points, errors_against
+from sph.cli import main
+from sph.errors import ConfigError, FileError
+from sph.output.checkpoint import Checkpoint
+from sph.output.run_directory import RunDirectory
+from sph.particles import Particles
+from sph.progress import Lines
+
+# Sums of some hundred terms, in any order.
+ROUND_OFF = 1e-12
+
+
+def state(dimension, boundary, n=120, seed=0) -> Checkpoint:
+    """A checkpoint of random particles in the unit box, as `at_points` asks for it."""
+    random = np.random.default_rng(seed)
+    particles = Particles.at_start(
+        random.random((dimension, n)),
+        random.normal(size=(dimension, n)),
+        1.0 + random.random(n),
+        1.0 + random.random(n),
+    )
+    particles.density[:] = 1.0 + random.random(n)
+    particles.support[:] = 0.2 + 0.2 * random.random(n)
+    text = (
+        f'[problem]\nname = "uniform"\ndimension = {dimension}\ndomain = [0.0, 1.0]\n'
+        f'boundary = "{boundary}"\n'
+    )
+    config = configuration.from_text(text)
+    nothing = np.zeros(0)
+    return Checkpoint(particles, 0.0, 0, 1.0, nothing, nothing, 0.0, config, ())
+
+
+def written_out(one: Checkpoint, points, images) -> dict:
+    """The formula point by point; images(x) gives (sign, position) of a particle's images."""
+    particles = one.particles
+    kernel, dim = one.config.physics.kernel_model(), (0,) * particles.dimension
+    scalars = {
+        "density": particles.density,
+        "pressure": one.pressure,
+        "internal_energy": particles.internal_energy,
+    }
+    found = {name: np.zeros(points.shape[1]) for name in scalars}
+    found["velocity"] = np.zeros_like(points)
+    for i, point in enumerate(points.T):
+        total = 0.0
+        for j in range(particles.number):
+            H = particles.support[j]
+            volume = particles.mass[j] / particles.density[j]
+            for sign, position in images(particles.position[:, j]):
+                q = np.linalg.norm(point - position) / H
+                share = volume * H**-particles.dimension * kernel.w(dim, q)
+                total += share
+                for name, values in scalars.items():
+                    found[name][i] += share * values[j]
+                found["velocity"][:, i] += share * sign * particles.velocity[:, j]
+        for values in found.values():
+            values[..., i] /= total
+    return found
+
+
+def periodic(x):
+    steps = np.array(np.meshgrid(*[(-1, 0, 1)] * x.size)).reshape(x.size, -1).T
+    return [(np.ones(x.size), x + step) for step in steps]
+
+
+def walls(x):
+    """Reflections of a particle in the unit box, on every axis alone and together."""
+    choices = np.array(np.meshgrid(*[(0, 1, 2)] * x.size)).reshape(x.size, -1).T
+    signs = np.array([1.0, -1.0, -1.0])
+    return [(signs[one], signs[one] * x + np.array([0.0, 0.0, 2.0])[one]) for one in choices]
+
+
+@pytest.mark.parametrize(("boundary", "images"), [("periodic", periodic), ("mirror", walls)])
+@pytest.mark.parametrize("dimension", [1, 2])
+def test_fields_are_carried_by_the_kernels(dimension, boundary, images):
+    one = state(dimension, boundary)
+    points = np.random.default_rng(5).random((dimension, 12))
+    found, expected = at_points(one, points), written_out(one, points, images)
+    assert found.keys() == expected.keys()
+    for name, values in expected.items():
+        assert found[name] == pytest.approx(values, rel=ROUND_OFF, abs=ROUND_OFF)
+
+
+def test_in_chunks_it_is_the_same(monkeypatch):
+    one, points = state(2, "periodic"), np.random.default_rng(5).random((2, 30))
+    whole = at_points(one, points)
+    monkeypatch.setattr("sph.analysis.reference.CHUNK", 7)
+    for name, values in at_points(one, points).items():
+        assert values == pytest.approx(whole[name], rel=ROUND_OFF, abs=ROUND_OFF)
+
+
+def test_a_constant_stays_constant_and_beyond_the_gas_is_nothing():
+    one = state(3, "open")
+    one.particles.density[:] = 2.5
+    found = at_points(one, np.array([[0.5, 9.0], [0.5, 9.0], [0.5, 9.0]]))["density"]
+    assert found[0] == pytest.approx(2.5, rel=ROUND_OFF)
+    assert np.isnan(found[1])
+
+
+@pytest.fixture(scope="module")
+def tubes(tmp_path_factory):
+    """Three runs of a short tube, the last one finer."""
+    directory = tmp_path_factory.mktemp("tubes")
+    for n in (50, 100, 800):
+        text = (
+            f'[problem]\nname = "shock_tube"\nn = {n}\n[time]\nend = 0.05\n'
+            "[output]\ninterval = 0.05\n[run]\nthreads = 1\n"
+        )
+        run = RunDirectory.create(directory / f"n={n}")
+        runner.run(configuration.from_text(text), run, Lines())
+    return directory
+
+
+def test_errors_against_a_finer_run_are_nearly_those_against_the_exact_solution(tubes):
+    fine = Reference(tubes / "n=800")
+    for n in (50, 100):
+        found = errors_against(fine, tubes / f"n={n}")
+        exact = json.loads((tubes / f"n={n}" / "summary.json").read_text())["errors"]
+        assert found["particles"] == exact["particles"]
+        for name in ("density", "velocity", "pressure", "internal_energy"):
+            # the reference's own error, an eighth of that of n = 100 at first order, and as much
+            # again for the smoothing by its kernels
+            assert found["fields"][name]["L1"] == pytest.approx(
+                exact["fields"][name]["L1"], rel=0.25
+            )
+
+
+def test_a_run_has_no_error_against_itself_but_its_smoothing(tubes):
+    itself = errors_against(Reference(tubes / "n=100"), tubes / "n=100")
+    finer = errors_against(Reference(tubes / "n=800"), tubes / "n=100")
+    assert 0.0 < itself["fields"]["density"]["L1"] < finer["fields"]["density"]["L1"]
+
+
+def test_the_command_takes_a_reference(tubes, tmp_path):
+    arguments = ["report", str(tubes), "--reference", str(tubes / "n=800"), "-o", str(tmp_path)]
+    result = CliRunner().invoke(main, arguments)
+    assert result.exit_code == 0, result.output
+    numbers = [line.split()[0] for line in result.stdout.splitlines()[:3]]
+    assert numbers == ["N", "51", "99"]  # without the reference itself
+    assert "The error is L1 of density against the run n=800" in result.stdout
+
+
+def test_what_does_not_fit(tubes, tmp_path):
+    text = (tubes / "n=50" / "config.toml").read_text()
+    other = RunDirectory.create(tmp_path / "other")
+    config = configuration.from_text(text).override(["time.end=0.02"])
+    runner.run(config, other, Lines())
+    with pytest.raises(ConfigError, match=r"has no checkpoint at t = 0\.05"):
+        errors_against(Reference(other.path), tubes / "n=50")
+    with pytest.raises(FileError, match="is not a run directory"):
+        Reference(tubes)
+    (other.path / "checkpoints" / "checkpoint_000000.h5").write_text("damaged")
+    with pytest.raises(FileError, match="is not a checkpoint, or damaged"):
+        Reference(other.path)

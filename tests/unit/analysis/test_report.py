@@ -1,0 +1,351 @@
+"""Reports on runs whose errors and costs are made up, so that what they must say is known."""
+
+import csv
+import json
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+from sph import config as configuration
+from sph.analysis import report as reports
+from sph.analysis.report import front, runs, words
+from sph.cli import main
+from sph.errors import ConfigError, FileError
+from sph.output.run_directory import RunDirectory
+from sph.sweep.manifest import SweepDirectory
+from sph.sweep.plan import Plan
+
+# A few operations on numbers of order one.
+ROUND_OFF = 1e-12
+
+
+# --- front and fits ---------------------------------------------------------------------------
+
+
+def test_the_front_is_what_nobody_beats_in_both():
+    cost = np.array([1.0, 2.0, 4.0, 2.0, 4.0, 8.0])
+    error = np.array([8.0, 4.0, 2.0, 5.0, 4.0, 2.0])
+    #   worse than the second at its cost; dearer than the second at its error; than the third
+    assert front.on_front(cost, error).tolist() == [True, True, True, False, False, False]
+
+
+def test_equal_runs_are_both_on_the_front():
+    assert front.on_front(np.array([1.0, 1.0]), np.array([2.0, 2.0])).all()
+
+
+def test_the_front_between_its_runs_is_a_power_law():
+    """cost = 16 / error^2 through the two runs gives 16/9 at 3, and nothing cheaper at 10."""
+    cost, error = np.array([1.0, 4.0]), np.array([4.0, 2.0])
+    assert front.cost_at(3.0, cost, error) == pytest.approx(16 / 9, rel=ROUND_OFF)
+    assert front.cost_at(10.0, cost, error) == pytest.approx(1.0, rel=ROUND_OFF)
+    with pytest.raises(ValueError, match="does not reach"):
+        front.cost_at(1.9, cost, error)
+
+
+def test_excess_is_the_cost_over_the_fronts_at_equal_error():
+    cost = np.array([1.0, 4.0, 16 / 3, 3.0, 1.0])
+    error = np.array([4.0, 2.0, 3.0, 10.0, 5.0])
+    # off the front: 16/3 over 16/9; 3 over the cheapest; as cheap as the cheapest but worse
+    assert front.excess(cost, error) == pytest.approx([1.0, 1.0, 3.0, 3.0, 1.0], rel=ROUND_OFF)
+    assert front.on_front(cost, error).tolist() == [True, True, False, False, False]
+
+
+def test_excess_is_at_least_one():
+    random = np.random.default_rng(1)
+    cost, error = np.exp(random.normal(size=(2, 200)))
+    assert front.excess(cost, error).min() >= 1.0 - ROUND_OFF
+
+
+def test_slopes_are_exponents():
+    x = np.array([1.0, 2.0, 4.0])
+    assert front.slope(x, 3.0 * x**-1.5) == pytest.approx(-1.5, rel=ROUND_OFF)
+    # least squares: a middle point that is off shifts the line, and does not turn it
+    assert front.slope(x, np.array([1.0, 5.0, 4.0])) == pytest.approx(1.0, rel=ROUND_OFF)
+    assert front.slope(np.array([2.0, 2.0]), np.array([1.0, 3.0])) is None
+    assert front.slope(np.array([2.0]), np.array([1.0])) is None
+
+
+# --- runs that are made up --------------------------------------------------------------------
+
+
+def write_run(path, error, cpu, overrides=(), status="done", **changes):
+    """A run directory as `sph run` leaves it; of its CPU time 10 s compile and 1 s starts."""
+    (path.parent / "base").mkdir(parents=True, exist_ok=True)
+    base = path.parent / "base" / "base.toml"
+    base.write_text('[problem]\nname = "shock_tube"\n')
+    config = configuration.load(base, overrides)
+    run = RunDirectory.create(path)
+    run.write_config(config.to_toml())
+    norms = {"L1": error, "L2": 2 * error, "Linf": 3 * error} if error else None
+    n = config.problem.n
+    session = {
+        "steps": 100, "updates": 100 * n, "compile_cpu_seconds": 10.0, "cpu_seconds": cpu + 11.0,
+        "phases_cpu_seconds": {"start of Numba": 1.0, "density": cpu / 2, "rates": cpu / 4},
+    }  # fmt: skip
+    summary = {
+        "status": status, "reason": None, "problem": "shock_tube", "steps": 100,
+        "dimension": config.problem.dimension, "particles": n, "time": 0.2,
+        "errors": {"region": "all", "fields": {"density": norms}} if norms else None,
+        "report": {"radius_error": -error if error else None},
+        "conservation": {"energy_drift": -1e-5, "energy_drift_max": 2e-5, "momentum_change": None},
+        "cost": {"cpu_seconds": cpu + 11.0, "wall_seconds": cpu / 2 + 11.0, "threads": 2,
+                 "session": session},
+    }  # fmt: skip
+    run.write_summary(summary | changes)
+    return run.path
+
+
+@pytest.fixture
+def study(tmp_path):
+    """Error = 100/N and CPU = (N/100)^2 for alpha = 1; thrice the time for alpha = 2."""
+    for alpha, factor in ((1.0, 1.0), (2.0, 3.0)):
+        for n in (100, 200, 400):
+            write_run(tmp_path / "study" / f"n={n},alpha={alpha}", 100 / n, factor * (n / 100) ** 2,
+                      [f"problem.n={n}", f"physics.alpha={alpha}"])  # fmt: skip
+    return tmp_path / "study"
+
+
+def compared(*sources, **question):
+    return reports.make(sources, reports.Question(**question))
+
+
+def said(report):
+    return "\n".join(words.sentences(report))
+
+
+def test_costs_leave_out_compiling_and_starting(tmp_path):
+    (row,) = runs.read([write_run(tmp_path / "run", 0.1, 5.0, ["problem.n=100"])])
+    assert row.cost == {"cpu": 5.0, "wall": 2.5, "updates": 10_000, "n": 100}
+
+
+def test_what_varies_is_found(study, tmp_path):
+    rows = runs.read([study])
+    assert runs.varied_keys(rows) == ["problem.n", "physics.alpha"]
+    assert [row.n for row in rows[:3]] == [100, 100, 200]  # n=100 before n=200
+    # threads change no result, and what goes with the problem's name says nothing more
+    rows = runs.read([
+        write_run(tmp_path / "a" / "1", 0.1, 1.0, ["run.threads=1"]),
+        write_run(tmp_path / "a" / "2", 0.1, 1.0, ["problem.name=uniform", "run.threads=2"]),
+    ])  # fmt: skip
+    assert runs.varied_keys(rows) == ["problem.name"]
+
+
+def test_a_models_parameters_are_shown_where_they_vary(tmp_path):
+    flattened = "physics.kernel={name = 'cubic_spline', flattened = %s}"
+    paths = [
+        write_run(tmp_path / "s" / "1", 0.1, 1.0, [flattened % "true"]),
+        write_run(tmp_path / "s" / "2", 0.1, 1.0, ["physics.kernel=wendland_c2"]),
+    ]
+    assert [row.value("physics.kernel") for row in runs.read(paths)] == [
+        "cubic_spline",
+        "wendland_c2",
+    ]
+    write_run(tmp_path / "s" / "3", 0.1, 1.0, [flattened % "false"])
+    assert [row.value("physics.kernel") for row in runs.read([tmp_path / "s"])] == [
+        "cubic_spline(flattened=true)",
+        "wendland_c2",
+        "cubic_spline(flattened=false)",
+    ]
+
+
+def test_a_run_named_twice_counts_once(study):
+    assert len(runs.read([study, study / "n=100,alpha=1.0"])) == 6
+
+
+def test_lines_front_and_orders(study):
+    report = compared(study)
+    first, second = report.series
+    assert (first.label, second.label) == ("alpha = 1.0", "alpha = 2.0")
+    assert [report.rows[i].n for i in first.members] == [100, 200, 400]
+    # in 1-D spacing ~ 1/N, and cost ~ N^2
+    for line in report.series:
+        assert line.order == pytest.approx(1.0, rel=ROUND_OFF)
+        assert line.exponent == pytest.approx(-0.5, rel=ROUND_OFF)
+    assert report.on_front.tolist() == [True] * 3 + [False] * 3
+    assert report.excess == pytest.approx([1.0] * 3 + [3.0] * 3, rel=ROUND_OFF)
+
+
+def test_the_order_is_in_the_spacing_also_in_2d(tmp_path):
+    plane = ["problem.dimension=2"]
+    for n in (100, 400):
+        write_run(tmp_path / "s" / str(n), 100 / n, n / 100.0, [*plane, f"problem.n={n}"])
+    (line,) = compared(tmp_path / "s").series
+    # error ~ 1/N = spacing^2
+    assert line.order == pytest.approx(2.0, rel=ROUND_OFF)
+
+
+def test_the_words(study):
+    text = said(compared(study))
+    assert "L1 of density, weighed with CPU time without compilation" in text
+    assert "alpha = 1.0: order 1.00 in the particle spacing, so error ∝ cost^-0.50." in text
+    assert "On the front: alpha = 1.0 at N = 100, 200, 400." in text
+    assert (
+        "alpha = 2.0 is never on the front: 3 times the CPU time of the front "
+        "at equal error." in text
+    )
+
+
+def test_the_words_of_other_standings(tmp_path):
+    directory = tmp_path / "s"
+    for alpha, n, error, cpu in (
+        (1.0, 100, 1.0, 1.0), (1.0, 200, 0.5, 4.0),
+        (2.0, 100, 1.0, 1.05),  # within the scatter of timings
+        (3.0, 100, 2.0, 7.0),  # less accurate than all of the front: a bound
+        (4.0, 100, 0.8, 1.2), (4.0, 200, 0.5, 8.0),  # once on it
+    ):  # fmt: skip
+        write_run(directory / f"{alpha},{n}", error, cpu,
+                  [f"physics.alpha={alpha}", f"problem.n={n}"])  # fmt: skip
+    text = said(compared(directory))
+    assert "alpha = 2.0 is never on the front, but within 10% of it." in text
+    assert "alpha = 3.0 is never on the front: at least 7 times" in text
+    assert "alpha = 4.0 is off the front at N = 200: 2 times the CPU time" in text
+    assert "alpha = 4.0 at N = 100" in text.partition("On the front")[2].splitlines()[0]
+
+
+def test_other_questions(study):
+    assert compared(study, norm="Linf").error[0] == pytest.approx(3.0)
+    assert compared(study, cost="wall").cost[0] == pytest.approx(0.5)
+    by_updates = compared(study, cost="updates")
+    # they cost the same updates at the same error: all are on the front
+    assert by_updates.on_front.all()
+    figure = compared(study, field="report.radius_error")
+    assert figure.error[1] == pytest.approx(0.5)
+    assert "The error is report.radius_error" in said(figure)
+    by_number = compared(study, by=("problem.n",))
+    assert [line.label for line in by_number.series][:2] == ["n = 100", "n = 200"]
+
+
+def test_by_tells_colours_apart_and_lines_stay_apart(tmp_path):
+    for alpha in (1.0, 2.0):
+        for eta in (1.2, 1.6):
+            for n in (100, 200):
+                keys = [f"physics.alpha={alpha}", f"physics.eta={eta}", f"problem.n={n}"]
+                write_run(tmp_path / "s" / f"{alpha},{eta},{n}", alpha * eta / n, float(n), keys)
+    report = compared(tmp_path / "s", by=("physics.eta",))
+    assert [len(line.members) for line in report.series] == [2, 2, 2, 2]
+    assert {line.group for line in report.series} == {"eta = 1.2", "eta = 1.6"}
+
+
+def test_runs_without_an_error_are_listed(study, tmp_path):
+    write_run(study / "failed", None, 1.0, status="failed", reason="u < 0 of particle 3\nTry: …")
+    write_run(study / "inexact", None, 1.0)
+    RunDirectory.create(study / "killed").write_config((study / "failed/config.toml").read_text())
+    report = compared(study)
+    assert len(report.rows) == 6
+    text = said(report)
+    assert "Without an error: failed (failed: u < 0 of particle 3)." in text
+    assert "Without an error: inexact (it has no L1 of density)." in text
+    assert "Without an error: killed (unfinished: it has not ended)." in text
+
+
+def test_points_of_a_sweep_without_a_run_are_listed(tmp_path):
+    base = tmp_path / "tube.toml"
+    base.write_text('[problem]\nname = "shock_tube"\n')
+    sweep = SweepDirectory(tmp_path / "sweep")
+    sweep.prepare(base, Plan.of(["problem.n=100,200,300"]))
+    write_run(tmp_path / "sweep" / "problem.n=100", 0.1, 1.0, ["problem.n=100"])
+    (sweep.logs / "problem.n=200.failed").write_text("the disk is full\n")
+    text = said(compared(tmp_path / "sweep"))
+    assert "problem.n=200 (failed: the disk is full)" in text
+    assert "problem.n=300 (unfinished: it was not begun)" in text
+
+
+def test_what_to_know(study, tmp_path):
+    write_run(study / "restarted", 0.3, 50.0, ["problem.n=300"], steps=200)
+    write_run(study / "longer", 0.3, 50.0, ["problem.n=300", "time.end=0.3"])
+    text = said(compared(study))
+    assert "take to start: restarted." in text.replace("took", "take")
+    assert "different tasks (time.end)" in text
+    assert "took to start" not in said(compared(study, cost="updates"))
+
+
+def test_nothing_to_compare(tmp_path):
+    write_run(tmp_path / "s" / "one", None, 1.0, status="failed", reason="u < 0")
+    report = compared(tmp_path / "s")
+    assert report.rows == []
+    assert "Without an error: one" in reports.in_words(report)
+    reports.write(report, tmp_path / "out")
+
+
+def test_wrong_questions(study, tmp_path):
+    with pytest.raises(ConfigError, match=r"--field entropy: .* density, report.radius_error"):
+        compared(study, field="entropy")
+    with pytest.raises(ConfigError, match=r"--by physics\.aplha: .* problem.n, physics.alpha"):
+        compared(study, by=("physics.aplha",))
+    with pytest.raises(FileError, match="does not exist"):
+        compared(tmp_path / "nowhere")
+    (tmp_path / "empty").mkdir()
+    with pytest.raises(FileError, match="holds no runs"):
+        compared(tmp_path / "empty")
+    (study / "n=100,alpha=1.0" / "summary.json").write_text("{")
+    with pytest.raises(FileError, match=r"summary\.json cannot be read"):
+        compared(study)
+
+
+# --- what is written --------------------------------------------------------------------------
+
+
+def test_the_command_writes_table_words_and_pictures(study):
+    result = CliRunner().invoke(main, ["report", str(study)])
+    assert result.exit_code == 0, result.output
+    header, *lines = result.stdout.splitlines()[:7]
+    assert re.split(r"  +", header.strip()) == [
+        "physics.alpha", "N", "steps", "CPU s", "L1 of density", "energy drift",
+        "against the front",
+    ]  # fmt: skip
+    assert lines[0].split() == ["1.0", "100", "100", "1", "1", "2.0e-05", "front"]
+    assert lines[5].split() == ["2.0", "400", "100", "48", "0.25", "2.0e-05", "×", "3.00"]
+    written = sorted(path.name for path in (study / "report").iterdir())
+    assert written == ["error_against_cpu.png", "error_against_n.png", "phases.png",
+                       "report.csv", "report.json", "report.md"]  # fmt: skip
+    with (study / "report" / "report.csv").open() as file:
+        records = list(csv.DictReader(file))
+    assert len(records) == 6
+    last = records[-1]
+    assert (last["physics.alpha"], last["particles"], last["on_front"]) == ("2.0", "400", "False")
+    assert (float(last["density.L2"]), float(last["report.radius_error"])) == (0.5, -0.25)
+    assert float(last["excess"]) == pytest.approx(3.0, rel=ROUND_OFF)
+    found = json.loads((study / "report" / "report.json").read_text())
+    assert [line["order"] for line in found["series"]] == pytest.approx([1.0, 1.0])
+    text = (study / "report" / "report.md").read_text()
+    assert "| 2.0 | 400 | 100 | 48 | 0.25 | 2.0e-05 | × 3.00 |" in text
+    assert all(f"]({name})" in text for name in written if name.endswith(".png"))
+    # a report beside the runs is not taken for one
+    assert CliRunner().invoke(main, ["report", str(study)]).exit_code == 0
+
+
+def test_the_pictures_hold_the_runs(study):
+    from sph.analysis.figures import report as pictures
+
+    report = compared(study)
+    panel = pictures.error_against_cost(report).axes[0]
+    lines = {line.get_label(): line for line in panel.lines}
+    assert lines["Pareto front"].get_xdata().tolist() == [1.0, 4.0, 16.0]
+    (label,) = (label for label in lines if label.startswith(r"$\alpha$ = 2.0"))
+    assert label.endswith("cost$^{-0.50}$")
+    assert lines[label].get_xdata().tolist() == [3.0, 12.0, 48.0]
+    assert lines[label].get_ydata().tolist() == [1.0, 0.5, 0.25]
+    # guides: orders 1 and 2 in 1-D with one step for all are cost^(-1/2) and cost^-1
+    guides = [line for line in panel.lines if line.get_linestyle() == ":"]
+    slopes = [front.slope(*map(np.asarray, line.get_data())) for line in guides]
+    assert slopes == pytest.approx([-0.5, -1.0], rel=ROUND_OFF)
+    panel = pictures.error_against_number(report).axes[0]
+    assert any(line.get_label() == r"$\alpha$ = 1.0: order 1.00" for line in panel.lines)
+    bars = pictures.phases(report).axes[0].containers
+    widths = {one.get_label(): [bar.get_width() for bar in one] for one in bars}
+    assert set(widths) == {"density", "rates", "other"}
+    assert widths["density"] == pytest.approx([50.0] * 6)
+    assert np.sum(list(widths.values()), axis=0) == pytest.approx([100.0] * 6)
+
+
+def test_the_commands_cost_nothing_until_called():
+    heavy = {"matplotlib", "h5py", "pydantic", "distributed", "submitit"}
+    code = f"import sys, sph.cli_studies; print(*({heavy!r} & set(sys.modules)))"
+    found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True,
+                           cwd=Path(reports.__file__).parents[3])  # fmt: skip
+    assert found.stdout.strip() == ""

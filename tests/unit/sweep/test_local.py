@@ -1,0 +1,199 @@
+"""Sweeps on this machine: killed, stopped, failed, and run again."""
+
+import fcntl
+import json
+import os
+import signal
+import threading
+from dataclasses import replace
+from pathlib import Path
+
+import h5py
+import pytest
+from conftest import attempts, runs, until
+
+from sph.output.history import read as read_history
+from sph.sweep.local import available_processors
+from sph.sweep.manifest import SweepDirectory
+from sph.sweep.plan import Plan
+from sph.sweep.task import execute, tasks
+
+
+def summaries(directory):
+    return {name: json.loads(run.summary.read_text()) for name, run in runs(directory).items()}
+
+
+def prepared(program, *varies):
+    """The tasks of a sweep that has not been run."""
+    sweep = SweepDirectory(program.directory / "sweep")
+    plan = Plan.of(varies)
+    sweep.prepare(program.config, plan)
+    return tasks(sweep, plan)
+
+
+def test_a_killed_sweep_run_again_ends_with_all_points(killed):
+    assert killed.second.exit_code == 0, killed.second.output
+    assert "12 of 12 points are done." in killed.second.stdout
+    found = summaries(killed.path)
+    assert len(found) == 12
+    assert {summary["status"] for summary in found.values()} == {"done"}
+    assert {summary["time"] for summary in found.values()} == {0.4}
+
+
+def test_a_killed_sweep_repeats_no_work(killed):
+    assert "stopped: ended by signal 9" in killed.told
+    assert 4 <= len(killed.before) < 12  # else nothing was killed
+    for name, run in runs(killed.path).items():
+        assert attempts(killed.path, name).count("run") == 1
+        steps = read_history(run.history)["step"]
+        assert steps.tolist() == list(range(steps.size))
+        if name in killed.before:
+            assert run.summary.stat().st_mtime_ns == killed.before[name]
+    assert attempts(killed.path, killed.worker) == ["run", "restart"]
+    with h5py.File(runs(killed.path)[killed.worker].checkpoints()[-1]) as file:
+        (lineage,) = json.loads(file["Checkpoint"].attrs["lineage"])
+    assert lineage.startswith("restarted at step")
+    assert "step 0," not in lineage
+
+
+def test_a_sweep_that_is_done_does_nothing(killed):
+    before = killed.done()
+    again = killed.program.run("--vary", "problem.n=40", "--vary", "physics.alpha=0.5,1.0",
+                               "-o", killed.path)  # fmt: skip
+    assert again.exit_code == 0
+    assert "2 of 2 points are done already" in again.stderr
+    assert killed.done() == before
+    assert len(SweepDirectory(killed.path).plan().points) == 12
+
+
+def test_a_failed_point_is_told_and_the_rest_go_on(program, tmp_path):
+    arguments = ("--vary", "physics.eta=1.6,50.0", "--vary", "physics.C=0.15,50.0",
+                 "--set", "problem.left.pressure=1e3", "--set", "time.end=0.002",
+                 "-o", tmp_path / "sweep")  # fmt: skip
+    result = program.run(*arguments)
+    assert result.exit_code == 3, result.output
+    assert "1 of 4 points are done, 3 failed" in result.stderr
+    # one failed in its steps, and two before there was a run directory to tell of it
+    assert "wider than the mirror box" in result.stderr
+    found = runs(tmp_path / "sweep")
+    assert found["physics.eta=1.6,physics.C=0.15"].summary.exists()
+    failed = found["physics.eta=1.6,physics.C=50.0"]
+    assert json.loads(failed.summary.read_text())["status"] == "failed"
+    reasons = SweepDirectory(tmp_path / "sweep").failures()
+    assert sorted(reasons) == [
+        "physics.eta=1.6,physics.C=50.0",
+        "physics.eta=50.0,physics.C=0.15",
+        "physics.eta=50.0,physics.C=50.0",
+    ]
+    assert json.loads(failed.summary.read_text())["reason"].strip() == reasons[failed.path.name]
+    result = program.run(*arguments)
+    assert result.exit_code == 3
+    assert "1 of 4 points are done already" in result.stderr
+    assert attempts(tmp_path / "sweep", "physics.eta=1.6,physics.C=0.15") == ["run"]
+    assert attempts(tmp_path / "sweep", failed.path.name) == ["run", "run"]
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM], ids=lambda one: one.name)
+def test_a_signal_stops_the_runs_with_a_checkpoint(number, program, tmp_path):
+    path = tmp_path / "sweep"
+    arguments = ("--vary", "problem.n=40,50,60", "--set", "time.end=4.0", "--jobs", "2", "-o", path)
+    process = program.started(*arguments)
+    first = ("problem.n=40", "problem.n=50")
+    for name in first:
+        until(lambda name=name: (path / name / "checkpoints" / "checkpoint_000002.h5").exists())
+    process.send_signal(number)
+    _, told = process.communicate(timeout=60)
+    assert process.returncode == 75, told
+    assert "0 of 3 points are done; the same command goes on with the rest." in told
+    assert "Traceback" not in told
+    assert {name: summaries(path)[name]["status"] for name in first} == dict.fromkeys(
+        first, "stopped"
+    )
+    assert not (path / "problem.n=60").exists()
+    # it goes on: shown up to the next look, not to the end
+    process = program.started(*arguments)
+    for name in first:
+        until(lambda name=name: attempts(path, name) == ["run", "restart"])
+    process.send_signal(signal.SIGTERM)
+    process.communicate(timeout=60)
+
+
+def test_a_second_interrupt_ends_the_runs_at_once(program, tmp_path):
+    path = tmp_path / "sweep"
+    # enough particles for the initial state to take longer than two signals
+    process = program.started("--vary", "problem.n=400000", "--jobs", "1", "-o", path)
+    log = path / "logs" / "problem.n=400000.log"
+    until(lambda: log.exists() and "preparing" in log.read_text())
+    process.send_signal(signal.SIGINT)
+    until(lambda: "again to stop at once" in log.read_text())
+    process.send_signal(signal.SIGINT)
+    _, told = process.communicate(timeout=60)
+    assert process.returncode == 1
+    assert "Aborted!" in told
+    assert not list(path.glob("*/checkpoints/*.h5"))
+
+
+def test_nobody_runs_a_point_that_another_process_is_at(program):
+    (task,) = prepared(program, "problem.n=40")
+    with task.log.open("ab") as held:
+        fcntl.flock(held, fcntl.LOCK_EX)
+        outcome = execute(task, stops=lambda: 1)
+        assert outcome == ("problem.n=40", "stopped", "another process is at it", "")
+        found = []
+        waiting = threading.Thread(target=lambda: found.append(execute(task)))
+        waiting.start()
+        waiting.join(0.3)
+        assert waiting.is_alive()
+        assert not task.run.path.exists()
+        # what the other process would have done
+        task.run.path.mkdir()
+        task.run.write_summary({"status": "done"})
+    waiting.join(10.0)
+    assert found == [("problem.n=40", "done", "", "")]
+
+
+def test_an_orphan_keeps_its_lock(program, tmp_path):
+    path = tmp_path / "sweep"
+    process = program.started("--vary", "problem.n=40", "--set", "time.end=2.0", "-o", path)
+    until(lambda: (path / "problem.n=40" / "checkpoints" / "checkpoint_000000.h5").exists())
+    process.kill()
+    process.communicate()
+    with (path / "logs" / "problem.n=40.log").open("ab") as log, pytest.raises(BlockingIOError):
+        fcntl.flock(log, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    result = program.run("--vary", "problem.n=40", "--set", "time.end=2.0", "-o", path)
+    assert result.exit_code == 0, result.output
+    assert attempts(path, "problem.n=40") == ["run"]
+
+
+def test_threads_are_shared_out(program, monkeypatch):
+    from sph.sweep import local
+
+    found = prepared(program, "problem.n=40:80:+10")
+    told = []
+    monkeypatch.setattr(local, "execute", lambda task, stops: task.threads)
+    monkeypatch.setattr(local, "available_processors", lambda: 8)
+    for jobs in (None, 2, 3):
+        local.run(found, jobs, told.append)
+    # five points leave one thread each of eight; two jobs four, and three jobs two
+    assert told == [1] * 5 + [4] * 5 + [2] * 5
+    told.clear()
+    chosen = [replace(task, overrides=("run.threads=3",)) for task in found]
+    local.run(chosen, 2, told.append)
+    assert told == [None] * 5
+
+
+def test_the_last_lines_of_a_run_without_a_message_are_the_reason(program, monkeypatch):
+    (task,) = prepared(program, "problem.n=40")
+    # a file where the run directory should be
+    Path(task.run.path).write_text("")
+    outcome = execute(task)
+    assert (outcome.status, outcome.how) == ("failed", "run")
+    assert "is a file" in outcome.reason
+    assert task.failure.read_text().strip() == outcome.reason
+    os.unlink(task.run.path)
+    assert execute(task).status == "done"
+    assert not task.failure.exists()
+
+
+def test_processors():
+    assert 1 <= available_processors() <= os.cpu_count()

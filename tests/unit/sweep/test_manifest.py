@@ -1,0 +1,110 @@
+"""The directory of a sweep: made once, extended, and refused where it is of something else."""
+
+import pytest
+
+from sph import config as configuration
+from sph.errors import ConfigError, FileError
+from sph.output.run_directory import RunDirectory
+from sph.sweep.manifest import SweepDirectory
+from sph.sweep.plan import Plan
+
+TUBE = '[problem]\nname = "shock_tube"\nn = 40\n'
+
+
+@pytest.fixture
+def config(tmp_path):
+    path = tmp_path / "tube.toml"
+    path.write_text(TUBE)
+    return path
+
+
+@pytest.fixture
+def sweep(tmp_path):
+    return SweepDirectory(tmp_path / "sweep")
+
+
+def of(*varies, overrides=()):
+    return Plan.of(varies, overrides)
+
+
+def files(directory):
+    return {path: path.read_bytes() for path in directory.rglob("*") if path.is_file()}
+
+
+def test_the_manifest_is_the_plan(config, sweep):
+    plan = of("problem.n=40,50", "physics.alpha={min = 0.1, max = 2.0},1.0",
+              overrides=["physics.kernel=cubic_spline"])  # fmt: skip
+    sweep.prepare(config, plan)
+    assert sweep.plan() == plan
+    assert sweep.base.read_text() == TUBE
+    sweep.prepare(config, plan)
+    assert sweep.plan() == plan
+
+
+def test_values_may_be_added(config, sweep):
+    sweep.prepare(config, of("problem.n=40,50"))
+    sweep.prepare(config, of("problem.n=60"))
+    assert sweep.plan() == of("problem.n=40,50,60")
+
+
+def test_the_same_configuration_may_be_given_in_another_way(config, sweep):
+    sweep.prepare(config, of("problem.n=50,60"))
+    config.write_text("# as before\n" + TUBE.replace("n = 40", "n = 70"))
+    # n is varied, the rest are defaults, and threads change no result
+    sweep.prepare(config, of("problem.n=50", overrides=["physics.C=0.15", "run.threads=1"]))
+    assert sweep.plan() == of("problem.n=50,60")
+
+
+@pytest.mark.parametrize(
+    ("plan", "words"),
+    [
+        (of("problem.n=50", overrides=["physics.C=0.3"]), "physics.C = 0.15 there, 0.3 now"),
+        (of("problem.n=90", overrides=["physics.C=0.3"]), "physics.C = 0.15 there, 0.3 now"),
+        (of("physics.alpha=1.0"), "over problem.n, not over physics.alpha"),
+    ],
+)
+def test_another_sweep_in_the_same_directory_is_refused(plan, words, config, sweep):
+    sweep.prepare(config, of("problem.n=50,60"))
+    before = files(sweep.path)
+    with pytest.raises(ConfigError, match=f"(?s){words}.*Try: another directory"):
+        sweep.prepare(config, plan)
+    assert files(sweep.path) == before
+
+
+def test_a_changed_file_is_refused(config, sweep):
+    sweep.prepare(config, of("problem.n=50"))
+    config.write_text(TUBE + "[physics]\nbalsara = false\n")
+    with pytest.raises(ConfigError, match=r"physics\.balsara = True there, False now"):
+        sweep.prepare(config, of("problem.n=50"))
+
+
+def test_a_run_of_something_else_in_a_points_place_is_refused(config, sweep):
+    sweep.prepare(config, of("problem.n=50"))
+    run = RunDirectory.create(sweep.path / "problem.n=50")
+    other = configuration.load(config, ["problem.n=50", "time.end=0.3"])
+    run.write_config(other.to_toml())
+    run.write_summary({"status": "done"})
+    with pytest.raises(ConfigError, match=r"time\.end = 0.3 there, 0.2 now"):
+        sweep.prepare(config, of("problem.n=50"))
+
+
+def test_a_directory_of_something_else_is_refused(config, tmp_path):
+    (tmp_path / "mine").mkdir()
+    (tmp_path / "mine" / "letter.txt").touch()
+    for path in (tmp_path / "mine", config):
+        with pytest.raises(FileError, match="not the directory of a sweep"):
+            SweepDirectory(path).prepare(config, of("problem.n=50"))
+
+
+def test_a_wrong_point_makes_no_directory(config, sweep):
+    with pytest.raises(ConfigError):
+        sweep.prepare(config, of("problem.n=50,-1"))
+    assert not sweep.path.exists()
+
+
+@pytest.mark.parametrize("text", ["", "points = 1", "[["])
+def test_what_is_no_manifest(text, config, sweep):
+    sweep.prepare(config, of("problem.n=50"))
+    sweep.manifest.write_text(text)
+    with pytest.raises(FileError, match="is not the manifest of a sweep"):
+        sweep.prepare(config, of("problem.n=50"))

@@ -1,0 +1,127 @@
+"""`--vary` read, ranges written out, their product and its names."""
+
+import re
+
+import pytest
+
+from sph.errors import ConfigError
+from sph.sweep.plan import LONGEST_NAME, Plan, expand, split
+
+TUBE = '[problem]\nname = "shock_tube"\n'
+
+
+@pytest.mark.parametrize(
+    ("text", "parts"),
+    [
+        ("1,2, 3", ["1", "2", "3"]),
+        ("0.5", ["0.5"]),
+        ("{min = 0.1, max = 2.0},1.0", ["{min = 0.1, max = 2.0}", "1.0"]),
+        ("[[0, 1], [2, 3]],[0, 1]", ["[[0, 1], [2, 3]]", "[0, 1]"]),
+        ("\"a,b\",'c,d'", ['"a,b"', "'c,d'"]),
+        ('"a[","b"', ['"a["', '"b"']),
+        ("wendland_c2,{name = 'cubic_spline', flattened = true}",
+         ["wendland_c2", "{name = 'cubic_spline', flattened = true}"]),
+    ],
+)  # fmt: skip
+def test_values_are_split_at_commas_outside_of_brackets_and_quotes(text, parts):
+    assert split(text) == parts
+
+
+@pytest.mark.parametrize(
+    ("text", "values"),
+    [
+        ("100:1600:x2", ["100", "200", "400", "800", "1600"]),
+        ("100:1599:x2", ["100", "200", "400", "800"]),
+        ("800:100:x0.5", ["800", "400", "200", "100"]),
+        ("0.5:4:x2", ["0.5", "1.0", "2.0", "4.0"]),
+        ("0.05:0.3:+0.05", ["0.05", "0.1", "0.15", "0.2", "0.25", "0.3"]),
+        ("0.1:0.7:+0.2", ["0.1", "0.3", "0.5", "0.7"]),  # 0.6 / 0.2 is below 3 in binary numbers
+        ("1:1000:x10", ["1", "10", "100", "1000"]),  # and so is log 1000 / log 10
+        ("0.3:0.05:-0.05", ["0.3", "0.25", "0.2", "0.15", "0.1", "0.05"]),
+        ("1:2:+0.5", ["1.0", "1.5", "2.0"]),
+        ("-1:1:+1", ["-1", "0", "1"]),
+        ("5:5:+1", ["5"]),
+        ("1e-6:1e-2:x100", ["1e-06", "0.0001", "0.01"]),
+        ("wendland_c2", ["wendland_c2"]),
+        ("a:b:c", ["a:b:c"]),
+    ],
+)
+def test_ranges_include_their_last_value_within_rounding(text, values):
+    assert expand(text) == values
+
+
+@pytest.mark.parametrize(
+    "text",
+    ["100:1600:x1", "0:10:x2", "100:1600:x0.5", "1:2:+0", "1:2:-0.5", "0:1:+1e-9", "1:2:x2a"],
+)
+def test_ranges_that_lead_nowhere(text):
+    with pytest.raises(ConfigError, match=re.escape(text)):
+        expand(text)
+
+
+def test_the_product_runs_the_last_key_fastest_and_has_readable_names():
+    plan = Plan.of(["problem.n=100,200", "physics.alpha=1.0,2.0"], ["physics.C=0.3"])
+    assert [point.name for point in plan.points] == [
+        "problem.n=100,physics.alpha=1.0",
+        "problem.n=100,physics.alpha=2.0",
+        "problem.n=200,physics.alpha=1.0",
+        "problem.n=200,physics.alpha=2.0",
+    ]
+    assert plan.points[1].settings == ("problem.n=100", "physics.alpha=2.0")
+    assert plan.overrides == ("physics.C=0.3",)
+
+
+def test_names_are_safe_short_and_different():
+    plan = Plan.of(["physics.alpha={min = 0.1, max = 2.0},1.0", "a.b=x/y,x_y,x y,X/Y"])
+    names = [point.name for point in plan.points]
+    assert names[0].startswith("physics.alpha=min=0.1,max=2.0,a.b=x_y-")
+    assert all(re.fullmatch(r"[\w.,=+-]+", name, re.ASCII) for name in names)
+    # also where a file system does not tell capitals apart
+    assert len({name.casefold() for name in names}) == len(names) == 8
+    plan = Plan.of([f"a.b={'x' * 200}1,{'x' * 200}2"])
+    names = [point.name for point in plan.points]
+    assert len(set(names)) == 2
+    assert max(map(len, names)) <= LONGEST_NAME
+
+
+@pytest.mark.parametrize(
+    ("varies", "words"),
+    [
+        (["problem.n"], "expected TABLE.KEY=VALUE"),
+        (["n=1,2"], "expected TABLE.KEY=VALUE"),
+        (["problem.n="], "a value is empty"),
+        (["problem.n=1,,2"], "a value is empty"),
+        (["problem.n=1,2,1"], "1 stands there twice"),
+        (["problem.n=100:400:x2,200"], "200 stands there twice"),
+        (["problem.n=1", "problem.n=2"], "problem.n is varied already"),
+    ],
+)
+def test_what_cannot_be_varied(varies, words):
+    with pytest.raises(ConfigError, match=re.escape(words)):
+        Plan.of(varies)
+
+
+def test_all_points_are_resolved(tmp_path):
+    (tmp_path / "tube.toml").write_text(TUBE)
+    plan = Plan.of(["physics.kernel=cubic_spline,wendland_c2"], ["problem.n=50"])
+    found = plan.resolved(tmp_path / "tube.toml")
+    assert [config.problem.n for config in found.values()] == [50, 50]
+    assert found["physics.kernel=wendland_c2"].physics.kernel == "wendland_c2"
+
+
+def test_all_that_is_wrong_is_told_once_in_the_users_words(tmp_path):
+    (tmp_path / "tube.toml").write_text(TUBE)
+    plan = Plan.of(["problem.n=100,x,200", "physics.alpha=1.0,-1.0"], ["physics.C=-2"])
+    with pytest.raises(ConfigError) as told:
+        plan.resolved(tmp_path / "tube.toml")
+    lines = str(told.value).splitlines()
+    assert len(lines) == 3
+    starts = {line.partition(": ")[0] for line in lines}
+    assert starts == {"--set physics.C=-2", "--vary problem.n=x", "--vary physics.alpha=-1.0"}
+
+
+def test_what_is_wrong_only_together_names_the_point(tmp_path):
+    (tmp_path / "tube.toml").write_text(TUBE)
+    plan = Plan.of(["problem.dimension=1,2", "problem.lattice=cubic,hexagonal"])
+    with pytest.raises(ConfigError, match=r"dimension=1,problem\.lattice=hexagonal|--vary"):
+        plan.resolved(tmp_path / "tube.toml")

@@ -1,0 +1,74 @@
+"""Sweeps by submitit, whose local executor stands for Slurm: limits, failures, wrong options."""
+
+import os
+import signal
+
+import pytest
+from conftest import attempts, hashes, until
+
+from sph.sweep import slurm
+
+pytest.importorskip("submitit")
+psutil = pytest.importorskip("psutil")
+
+
+def job_of(run):
+    """ID of the process that submitit's limit signal goes to, for the point in that directory."""
+    for process in psutil.process_iter(["cmdline"]):
+        arguments = process.info["cmdline"] or []  # None where it ends as we look
+        if "sph.cli" in arguments and str(run) in arguments:
+            return process.ppid()
+    return None
+
+
+def test_a_job_that_comes_to_its_limit_goes_on_by_restart(program, tmp_path):
+    arguments = ("--vary", "problem.n=40", "--set", "time.end=1.0")
+    path = tmp_path / "sweep"
+    process = program.started(*arguments, "--slurm", "cluster=local", "--slurm", "timeout_min=5",
+                              "-o", path)  # fmt: skip
+    run = path / "problem.n=40"
+    until(lambda: (run / "checkpoints" / "checkpoint_000002.h5").exists())
+    os.kill(until(lambda: job_of(run)), signal.SIGUSR2)
+    _, told = process.communicate(timeout=60)
+    assert process.returncode == 0, told
+    assert attempts(path, "problem.n=40") == ["run", "restart"]
+    result = program.run(*arguments, "-o", tmp_path / "here")
+    assert result.exit_code == 0
+    assert hashes(path) == hashes(tmp_path / "here")
+
+
+def test_a_job_that_fails_is_told(program, tmp_path):
+    result = program.run("--vary", "physics.eta=50.0", "--slurm", "cluster=local", "-o",
+                         tmp_path / "sweep")  # fmt: skip
+    assert result.exit_code == 3, result.output
+    assert "physics.eta=50.0: particle" in result.stderr
+
+
+def test_options():
+    found = slurm._read(["timeout_min=60", "partition=short", "cpus_per_task=4"])
+    assert found == {"timeout_min": 60, "partition": "short", "cpus_per_task": 4}
+
+
+@pytest.mark.parametrize(
+    ("option", "words"),
+    [
+        ("partition", "expected KEY=VALUE"),
+        ("timeout_min=soon", "timeout_min"),
+        ("portition=short", "portition"),
+        ("cluster=nowhere", "nowhere"),
+    ],
+)
+def test_wrong_options(option, words, program, tmp_path):
+    local = [] if option.startswith("cluster") else ["--slurm", "cluster=local"]
+    result = program.run("--vary", "problem.n=40", "-o", tmp_path / "sweep", "--slurm", option,
+                         *local)  # fmt: skip
+    assert result.exit_code == 2, result.output
+    assert "--slurm" in result.stderr
+    assert words in result.stderr
+
+
+def test_one_place_to_run(program, tmp_path):
+    places = ("--slurm", "timeout_min=5", "--scheduler", "tcp://127.0.0.1:9")
+    result = program.run("--vary", "problem.n=40", "-o", tmp_path / "sweep", *places)
+    assert result.exit_code == 2
+    assert not (tmp_path / "sweep").exists()
