@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from sph.compiled import COMPILED
+from sph.compiled import COMPILED, larger, smaller
 from sph.neighbours.order import BLOCK, number_of_blocks
 from sph.threads import SMALLEST_RANGE
 
@@ -33,23 +33,32 @@ def _gap(lower_a, upper_a, lower_b, upper_b):
 
 
 @njit(**COMPILED, forceinline=True)
-def _fill(chunk, tree, position, support, stretch, images, region, start, count, candidates):
+def _fill(chunk, dim, tree, position, support, stretch, images, region, start, count, candidates):
     """List the blocks of one chunk into its region; return how much room they need."""
     first, last, lower, upper, largest = tree
     sign, offset = images
     begin_of_region = region[chunk]
     room = region[chunk + 1] - begin_of_region
-    D, n = position.shape
+    D = len(dim)  # a constant to the compiler, which unrolls the loops over it
+    n = support.size
     blocks = start.size
     nodes_on_stack = np.empty(128, np.int64)
     box_lower = np.empty(D)
     box_upper = np.empty(D)
+    members = np.empty((D, BLOCK))
+    supports = np.empty(BLOCK)
+    here = np.empty(D)
     needed = 0
     for block in range(chunk * CHUNK, min((chunk + 1) * CHUNK, blocks)):
         a, b = block * BLOCK, min((block + 1) * BLOCK, n)
         H_block = 0.0
         for p in range(a, b):
             H_block = max(H_block, support[p])
+        for p in range(BLOCK):  # a block that is not full repeats its last particle
+            supports[p] = support[min(a + p, b - 1)]
+            for d in range(D):
+                members[d, p] = position[d, min(a + p, b - 1)]
+        support_least = supports.min()
         for d in range(D):
             box_lower[d] = box_upper[d] = position[d, a]
             for p in range(a + 1, b):
@@ -78,13 +87,25 @@ def _fill(chunk, tree, position, support, stretch, images, region, start, count,
                     depth += 2
                     continue
                 for j in range(first[node] * BLOCK, min(last[node] * BLOCK, n)):
-                    squared = 0.0
+                    squared = farthest = 0.0
                     for d in range(D):
-                        x = sign[image, d] * position[d, j] + offset[image, d]
-                        gap = _gap(box_lower[d], box_upper[d], x, x)
+                        here[d] = sign[image, d] * position[d, j] + offset[image, d]
+                        gap = _gap(box_lower[d], box_upper[d], here[d], here[d])
                         squared += gap * gap
+                        farthest += (gap + box_upper[d] - box_lower[d]) ** 2
                     reach = stretch * max(H_block, support[j])
-                    if squared < reach * reach:
+                    if squared >= reach * reach:
+                        continue
+                    # Within reach of the box. Near its rim: keep it if it is in reach of a particle.
+                    nearest = farthest - (stretch * support_least) ** 2
+                    if nearest >= 0.0:
+                        for p in range(BLOCK):
+                            squared = 0.0
+                            for d in range(D):
+                                squared += (here[d] - members[d, p]) ** 2
+                            reach = stretch * larger(supports[p], support[j])
+                            nearest = smaller(nearest, squared - reach * reach)
+                    if nearest < 0.0:
                         if needed < room:
                             candidates[begin_of_region + needed] = j + (image << IMAGE_SHIFT)
                         needed += 1
@@ -95,11 +116,12 @@ def _fill(chunk, tree, position, support, stretch, images, region, start, count,
 
 @njit(**COMPILED)
 def _fill_chunks(
-    first, last, tree, position, support, stretch, images, region, start, count, candidates, needed
-):
+    first, last, dim, tree, position, support, stretch, images, region, start, count, candidates,
+    needed,
+):  # fmt: skip
     for chunk in range(first, last):
         needed[chunk] = _fill(
-            chunk, tree, position, support, stretch, images, region, start, count, candidates
+            chunk, dim, tree, position, support, stretch, images, region, start, count, candidates
         )
 
 
@@ -107,9 +129,10 @@ def build(tree, position, support, skin: float, images, team, room=None):
     """Lists of all blocks, and the room each chunk of them needed.
 
     position (D, N) and support (N,) in block order, `tree` built from them; candidates lie
-    within (1 + skin) max(H_block, H_j) of the block's box. `room` (chunks,): what an earlier
+    within (1 + skin) max(H_i, H_j) of one of the block's particles i. `room` (chunks,): what an earlier
     build needed, to size the storage; where it falls short the build is done once more.
     """
+    dim = (0,) * position.shape[0]
     blocks = number_of_blocks(support.size)
     chunks = (blocks + CHUNK - 1) // CHUNK
     if room is None or room.size != chunks:
@@ -121,7 +144,7 @@ def build(tree, position, support, skin: float, images, team, room=None):
         # 15 % to spare: lists rebuilt in a developing flow then rarely have to be built twice
         region = np.concatenate([[0], np.cumsum(room + room // 7 + 64)])
         candidates = np.empty(region[-1], np.int32)
-        team.run(_fill_chunks, chunks, tree, position, support, 1.0 + skin, images, region, start,
+        team.run(_fill_chunks, chunks, dim, tree, position, support, 1.0 + skin, images, region, start,
                  count, candidates, needed, smallest=SMALLEST_RANGE // CHUNK)  # fmt: skip
         if np.all(needed <= np.diff(region)):
             return Lists(start, count, candidates), needed

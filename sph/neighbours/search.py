@@ -14,8 +14,8 @@ from sph.neighbours.order import BLOCK
 GROWTH = 0.03
 
 # Cost of building lists over the cost of the two passes, measured in 3-D with 125 neighbours:
-# (0.2 + 1.1) / (1.3 + 1.0) microseconds a particle.
-BUILD_OVER_PASSES = 0.6
+# (0.2 + 1.4) / (0.93 + 0.85) microseconds a particle.
+BUILD_OVER_PASSES = 0.9
 
 
 class Origin(NamedTuple):
