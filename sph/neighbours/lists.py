@@ -96,7 +96,7 @@ def _fill(chunk, dim, tree, position, support, stretch, images, region, start, c
                     reach = stretch * max(H_block, support[j])
                     if squared >= reach * reach:
                         continue
-                    # Within reach of the box. Near its rim: keep it if it is in reach of a particle.
+                    # Within reach of the box. At its rim: keep it if it is in reach of a particle.
                     nearest = farthest - (stretch * support_least) ** 2
                     if nearest >= 0.0:
                         for p in range(BLOCK):
@@ -129,7 +129,7 @@ def build(tree, position, support, skin: float, images, team, room=None):
     """Lists of all blocks, and the room each chunk of them needed.
 
     position (D, N) and support (N,) in block order, `tree` built from them; candidates lie
-    within (1 + skin) max(H_i, H_j) of one of the block's particles i. `room` (chunks,): what an earlier
+    within (1 + skin) max(H_i, H_j) of a particle i of the block. `room` (chunks,): what an earlier
     build needed, to size the storage; where it falls short the build is done once more.
     """
     dim = (0,) * position.shape[0]
@@ -144,8 +144,10 @@ def build(tree, position, support, skin: float, images, team, room=None):
         # 15 % to spare: lists rebuilt in a developing flow then rarely have to be built twice
         region = np.concatenate([[0], np.cumsum(room + room // 7 + 64)])
         candidates = np.empty(region[-1], np.int32)
-        team.run(_fill_chunks, chunks, dim, tree, position, support, 1.0 + skin, images, region, start,
-                 count, candidates, needed, smallest=SMALLEST_RANGE // CHUNK)  # fmt: skip
+        team.run(
+            _fill_chunks, chunks, dim, tree, position, support, 1.0 + skin, images, region, start,
+            count, candidates, needed, smallest=SMALLEST_RANGE // CHUNK,
+        )  # fmt: skip
         if np.all(needed <= np.diff(region)):
             return Lists(start, count, candidates), needed
         room = needed.copy()

@@ -29,8 +29,8 @@ class Problem(base.Problem):
         ),
         "momentum_radius_error": base.Limit(
             0.03,
-            "2.7 % at 32^3 and alpha = 3, whose shock is a quarter of the radius wide; 0.7 % at 64^3 "
-            "or 0.15 % at alpha = 1.5",
+            "2.7 % at 32^3 and alpha = 3, whose shock is a quarter of the radius wide; 0.7 % at "
+            "64^3, or 0.15 % at alpha = 1.5",
         ),
     }
 
