@@ -117,10 +117,8 @@ def header(*cells) -> None:
 def engine(repeats: int) -> None:
     """3-D noisy lattice, 125 neighbours: microseconds of CPU an update, by phase."""
     print("## Engine: 3-D noisy lattice, 125 neighbours, double precision, one global step\n")
-    print(
-        "Whole runs of 20 steps with their start (first columns), and what a further step costs: the"
-    )
-    print("difference to runs of 4 steps, by phase.\n")
+    print("Whole runs of 20 steps with their start (first columns), and what a further step costs:")
+    print("the difference to runs of 4 steps, by phase.\n")
     run(uniform(n=4096, steps=3))  # fills the cache of compiled code
     header("particles", "threads", "thousand updates per CPU-s (min … max)", "peak memory (MB)",
            "CPU µs an update", "wall µs", *(f"{phase} (µs)" for phase in PHASES),
