@@ -226,6 +226,7 @@ class Simulation:
     def _density(self, models) -> None:
         """Steps 2-4 and 6: density, support, Omega, div and curl, EOS, Balsara, alpha's rate."""
         p = self.particles
+        self._wanted.fill(1.0)
         for _ in range(MAX_WIDENINGS):
             with self.clock.phase("density"):
                 self.team.run(

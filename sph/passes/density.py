@@ -20,8 +20,8 @@ def density(
 ):  # fmt: skip
     """Density pass over blocks [first_block, last_block).
 
-    wanted (blocks,): 0, or the multiple of list_support to which a block must be listed before
-    the pass is run again. A particle whose support was not found gets a density of -1.
+    wanted (blocks,): blocks where it is 0 are passed over. It becomes 0, or the multiple of
+    list_support to which the block must be listed before the pass is run again for it. A particle whose support was not found gets a density of -1.
     """
     D = len(dim)
     scheme, kernel, smoothing, eos, viscosity, _, balsara, support_ratio, eta = models
@@ -40,6 +40,8 @@ def density(
     r = np.empty(size)
     mu = np.empty(size if summed is not None else 0)
     for block in range(first_block, last_block):
+        if wanted[block] == 0.0:
+            continue
         nc = count[block]
         for k in range(nc):
             packed = candidates[start[block] + k]
