@@ -21,7 +21,8 @@ def density(
     """Density pass over blocks [first_block, last_block).
 
     wanted (blocks,): blocks where it is 0 are passed over. It becomes 0, or the multiple of
-    list_support to which the block must be listed before the pass is run again for it. A particle whose support was not found gets a density of -1.
+    list_support to which the block must be listed before the pass is run again for it. A particle
+    whose support was not found gets a density of -1.
     """
     D = len(dim)
     scheme, kernel, smoothing, eos, viscosity, _, balsara, support_ratio, eta = models
