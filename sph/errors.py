@@ -14,9 +14,13 @@ class ConfigError(SphError):
 
 
 class NumericalError(SphError):
-    """The run came to numbers that mean nothing."""
+    """The run came to numbers that mean nothing; `particle`: the ID of one that shows it, or 0."""
 
     exit_code = 3
+
+    def __init__(self, message: str, particle: int = 0):
+        super().__init__(message)
+        self.particle = particle
 
 
 class FileError(SphError):

@@ -15,6 +15,7 @@ from sph.config import Config
 from sph.errors import ConfigError, FileError, NumericalError, Stopped
 from sph.neighbours.search import Origin
 from sph.output import checkpoint as checkpoints
+from sph.output import offenders
 from sph.output.checkpoint import Checkpoint
 from sph.output.files import copy_file
 from sph.output.history import History
@@ -63,7 +64,8 @@ def restart(
     with stop_signals() as stopped_by, closing(Clock()) as clock:
         simulation = _resumed(config, checkpoint, clock)
         target.drop_checkpoints_after(number)
-        target.summary.unlink(missing_ok=True)  # a run that is killed must not keep the old one
+        for old in (target.summary, target.offenders):  # a run that is killed must not keep them
+            old.unlink(missing_ok=True)
         if target.history.exists():
             history = History.resume(target.history, checkpoint.step)
         else:
@@ -142,8 +144,18 @@ def _place_to_go_on(
 
 
 def _new_history(config: Config, simulation: Simulation, directory: RunDirectory) -> History:
-    extra = config.problem.diagnostics(simulation.particles)
-    return History.create(directory.history, config.problem.dimension, list(extra))
+    extra = [*_of_the_scene(simulation), *config.problem.diagnostics(simulation.particles)]
+    return History.create(directory.history, config.problem.dimension, extra)
+
+
+def _of_the_scene(simulation: Simulation) -> dict[str, float]:
+    """Columns of the history that only some scenes have."""
+    scene, columns = simulation.scene, {}
+    if scene.external is not None:
+        columns["potential_energy"] = simulation.totals.potential_energy
+    if scene.heating is not None:
+        columns["energy_added"] = simulation.energy_added
+    return columns
 
 
 def threads_of(config: Config) -> int:
@@ -194,9 +206,18 @@ class _Runner:
             if past["step"].size:
                 self.wall_before = past["wall_seconds"][-1]
                 self.cpu_before = past["cpu_seconds"][-1]
+                self._recall(past)
             else:  # a lone checkpoint: it begins the history, and has no limiter to tell
                 self._record()
             return self._to_end()
+
+    def _recall(self, past: dict[str, np.ndarray]) -> None:
+        """What the simulation counts from the start of the run on, out of the history."""
+        simulation = self.simulation
+        simulation.energy_injected = past["energy_injected"][-1]
+        if "energy_added" in past:
+            simulation.energy_added = past["energy_added"][-1]
+        simulation.watchdog.energy_at_start = past["total_energy"][0]
 
     @contextmanager
     def _closing(self):
@@ -221,13 +242,19 @@ class _Runner:
                     self.progress.step(simulation)
                 self._write_checkpoint()
         except NumericalError as error:
-            self._close("failed", reason=str(error))
-            last = self.directory.checkpoint_path(self.number - 1)
-            raise NumericalError(
-                f"{error}\nThe last good checkpoint is {last}: "
-                f"`sph restart {last} --set …` goes on from there with other settings."
-            ) from error
+            raise self._failed(error) from error
         return self._close("done")
+
+    def _failed(self, error: NumericalError) -> NumericalError:
+        """The error with what else a user needs: the neighbourhood, and where to go on from."""
+        self._close("failed", reason=str(error))
+        last = self.directory.checkpoint_path(self.number - 1)
+        words = offenders.leave(self.directory.offenders, self._checkpoint(), error.particle)
+        return NumericalError(
+            f"{error}\n{words}The last good checkpoint is {last}: "
+            f"`sph restart {last} --set …` goes on from there with other settings.",
+            error.particle,
+        )
 
     def _stop(self, name: str) -> None:
         simulation = self.simulation
@@ -252,6 +279,7 @@ class _Runner:
             "kinetic_energy": totals.kinetic_energy,
             "internal_energy": totals.internal_energy,
             "total_energy": totals.energy,
+            "energy_injected": simulation.energy_injected,
             "min_density": totals.min_density,
             "max_density": totals.max_density,
             "min_internal_energy": totals.min_internal_energy,
@@ -261,33 +289,35 @@ class _Runner:
         }
         momentum = zip("xyz", totals.momentum.tolist(), strict=False)
         row |= {f"momentum_{axis}": component for axis, component in momentum}
+        row |= _of_the_scene(simulation)
         with simulation.clock.phase("diagnostics"):
             row |= self.config.problem.diagnostics(simulation.particles)
         self.history.append(row)
 
     def _write_checkpoint(self) -> None:
         """Write the state, after the history up to it."""
-        simulation, origin = self.simulation, self.simulation.search.origin
+        simulation = self.simulation
         path = self.directory.checkpoint_path(self.number)
         with simulation.clock.phase("output"):
             self.history.flush()
-            checkpoints.write(
-                path,
-                Checkpoint(
-                    particles=simulation.particles,
-                    time=simulation.time,
-                    step=simulation.step,
-                    next_step=simulation.limit.dt,
-                    list_position=origin.position,
-                    list_support=origin.support,
-                    list_skin=origin.skin,
-                    config=self.config,
-                    lineage=self.lineage,
-                ),
-            )
+            checkpoints.write(path, self._checkpoint())
         self.number += 1
         self.saved_step = simulation.step
         self.progress.wrote(path, simulation)
+
+    def _checkpoint(self) -> Checkpoint:
+        simulation, origin = self.simulation, self.simulation.search.origin
+        return Checkpoint(
+            particles=simulation.particles,
+            time=simulation.time,
+            step=simulation.step,
+            next_step=simulation.limit.dt,
+            list_position=origin.position,
+            list_support=origin.support,
+            list_skin=origin.skin,
+            config=self.config,
+            lineage=self.lineage,
+        )
 
     def _close(self, status: str, reason: str | None = None) -> dict:
         self.history.flush()

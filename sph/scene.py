@@ -44,6 +44,16 @@ class Scene:
     def conducts(self) -> bool:
         return self.config.physics.conductivity is not None
 
+    @cached_property
+    def external(self):
+        """The external field, a model of `sph.external`, or None."""
+        return self.config.physics.external_model()
+
+    @cached_property
+    def heating(self):
+        """The source of internal energy, a model of `sph.heating`, or None."""
+        return self.config.physics.heating_model()
+
     @property
     def sums_pressure(self) -> bool:
         return schemes.sums_pressure(self.models.scheme)
@@ -107,6 +117,8 @@ class Scene:
         part(self.evolves_alpha, "equation for alpha", "alpha is one number")
         part(self.sums_pressure, "sum of the pressure", f"{physics.scheme} takes it from density")
         part(self.conducts, "artificial conductivity", "physics.conductivity is not given")
+        part(self.external is not None, "external field", "physics.external is not given")
+        part(self.heating is not None, "heating", "physics.heating is not given")
         part(physics.balsara, "Balsara factor", "physics.balsara = false")
         part(self.needs_divergence, "divergence of velocity", "neither Balsara nor alpha needs it")
         part(

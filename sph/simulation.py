@@ -1,15 +1,10 @@
 """The simulation: steps 1-9 of the seed, in its order, on whatever the scene has."""
 
-from typing import NamedTuple
-
 import numpy as np
-from numba import njit
 from numba.core.registry import cpu_target
 
-from sph import passes
+from sph import passes, totals
 from sph.clock import Clock
-from sph.compiled import COMPILED
-from sph.errors import NumericalError
 from sph.integrators import leapfrog, step_size
 from sph.neighbours.order import BLOCK, number_of_blocks
 from sph.neighbours.search import Origin, Search, first_guess
@@ -17,6 +12,7 @@ from sph.particles import Particles
 from sph.passes import density, rates
 from sph.scene import Scene
 from sph.threads import Team
+from sph.watchdog import Watchdog, fault
 
 # Each widening lists to at least the radius that was asked for, which grows by 2 at the most.
 MAX_WIDENINGS = 60
@@ -25,56 +21,11 @@ MAX_WIDENINGS = 60
 NEW_EACH_STEP = ("acceleration", "energy_rate", "alpha_rate", "density", "omega", "pressure")
 
 
-class Totals(NamedTuple):
-    """Sums and extremes over all particles."""
-
-    kinetic_energy: float
-    internal_energy: float
-    momentum: np.ndarray  # (D,)
-    min_density: float
-    max_density: float
-    min_internal_energy: float
-    max_internal_energy: float
-    rates: float  # of velocity and energy, all together: finite if each of them is
-
-    @property
-    def energy(self) -> float:
-        return self.kinetic_energy + self.internal_energy
-
-
-@njit(**COMPILED)
-def _totals(mass, velocity, energy, density, acceleration, energy_rate):
-    D, n = velocity.shape
-    momentum = np.zeros(D)
-    kinetic = internal = rates = 0.0
-    lowest_density = lowest_energy = np.inf
-    highest_density = highest_energy = -np.inf
-    for d in range(D):
-        along = squares = 0.0
-        for i in range(n):
-            along += mass[i] * velocity[d, i]
-            squares += mass[i] * velocity[d, i] ** 2
-            rates += acceleration[d, i]
-        momentum[d] = along
-        kinetic += 0.5 * squares
-    for i in range(n):
-        internal += mass[i] * energy[i]
-        rates += energy_rate[i]
-        lowest_energy = min(lowest_energy, energy[i])
-        highest_energy = max(highest_energy, energy[i])
-        lowest_density = min(lowest_density, density[i])
-        highest_density = max(highest_density, density[i])
-    return (
-        kinetic, internal, momentum, lowest_density, highest_density, lowest_energy,
-        highest_energy, rates,
-    )  # fmt: skip
-
-
 class Simulation:
     """Particles and the means to move them on.
 
     Attributes of use to others: particles, time, step (steps taken), limit (the coming step and
-    what sets it), totals, scene, search.origin, clock.
+    what sets it), totals, energy_added, energy_injected, scene, search.origin, clock, watchdog.
     """
 
     def __init__(self, scene: Scene, particles: Particles, threads: int, clock: Clock):
@@ -92,11 +43,18 @@ class Simulation:
         self.list_builds = 0
         self.limit = None
         self.totals = None
+        self.energy_added = 0.0  # by heating, since the run began
+        self.energy_injected = 0.0  # to keep internal energies positive, since the run began
+        self.watchdog = Watchdog(scene)
         n, blocks = particles.number, number_of_blocks(particles.number)
         if not scene.sums_pressure:
             particles.pressure = None
         elif particles.pressure is None:  # a start, or a restart that has changed the scheme
             particles.pressure = particles.pressure_by(scene.eos)
+        physics = scene.config.physics
+        self._bounds = step_size.Bounds(
+            physics.C, physics.energy_limit, scene.external is not None, scene.config.time.end
+        )
         self._dim = (0,) * scene.dimension
         self._support = np.zeros(n)
         self._velocity = np.empty_like(particles.velocity)  # full-step predictions (eqs 4-6)
@@ -123,7 +81,7 @@ class Simulation:
         self._build_lists(dt=0.0, guess=True)
         self._density(scene.starting_models)
         self._rates(scene.starting_models)
-        self._measure()
+        self._measure(past=None)
         return self
 
     @classmethod
@@ -137,7 +95,7 @@ class Simulation:
         self.limit = step_size.StepLimit(next_step, 0, "checkpoint")
         with clock.phase("lists"):
             self.search.build(origin, particles.id)
-        self.totals = self._sum()
+        self.totals = totals.of(particles, scene.external)
         return self
 
     def advance(self, until: float) -> None:
@@ -145,14 +103,20 @@ class Simulation:
 
         Raises NumericalError where the new state means nothing.
         """
-        dt, landing = self.limit.dt, False
+        allowed = self.limit.dt
+        dt, landing = allowed, False
         # a remainder of a billionth of a step is rounding, not a step
         if self.time + dt * (1 + 1e-9) >= until:
             dt, landing = until - self.time, True
         p = self.particles
         with self.clock.phase("predict, correct"):
+            self._heat(dt / 2)
             leapfrog.predict(dt, p.position, p.velocity, p.acceleration, self._velocity)
-            leapfrog.predict_scalar(dt, p.internal_energy, p.energy_rate, self._energy)
+            self.energy_injected += leapfrog.predict_energy(
+                dt, p.internal_energy, p.energy_rate, p.mass, self._energy
+            )
+            if self.scene.heating is not None:
+                self._energy = self.scene.heating.heated(self._energy, dt / 2)
             if p.alpha is not None:
                 leapfrog.predict_scalar(dt, p.alpha, p.alpha_rate, self._alpha)
             stale = self.search.stale(p.position, p.support)
@@ -162,13 +126,16 @@ class Simulation:
         self._rates(self.scene.models)
         with self.clock.phase("predict, correct"):
             leapfrog.correct(dt, p.velocity, p.acceleration)
-            leapfrog.correct(dt, p.internal_energy, p.energy_rate)
+            self.energy_injected += leapfrog.correct_energy(
+                dt, p.internal_energy, p.energy_rate, p.mass
+            )
+            self._heat(dt / 2)
             if p.alpha is not None:
                 leapfrog.correct(dt, p.alpha, p.alpha_rate)
         self.step += 1
         self.steps_here += 1
         self.time = until if landing else self.time + dt
-        self._measure()
+        self._measure(step_size.Past(dt, allowed, self._support))
 
     def close(self) -> None:
         self.team.close()
@@ -242,10 +209,12 @@ class Simulation:
                 self.scene.domain.bring_inside(p.position, (p.velocity, self._velocity))
                 self.search.widen(p.position, self._wanted, p.id)
         block = int(np.argmax(self._wanted))
-        raise NumericalError(
-            f"step {self.step}, t = {self.time:.6g}: no support holds enough neighbours for a "
-            f"particle among {p.id[block * BLOCK : (block + 1) * BLOCK].tolist()}.\n"
-            "Try: a closed domain (problem.boundary), or more particles."
+        among = p.id[block * BLOCK : (block + 1) * BLOCK].tolist()
+        raise fault(
+            self,
+            f"no support holds enough neighbours for a particle among {among}",
+            "a closed domain (problem.boundary), or more particles",
+            among[0],
         )
 
     def _rates(self, models) -> None:
@@ -258,53 +227,21 @@ class Simulation:
                 self._balsara, self._energy if self.scene.conducts else None, p.acceleration,
                 p.energy_rate, self._signal_speed,
             )  # fmt: skip
+            if self.scene.external is not None:
+                p.acceleration += self.scene.external.acceleration(p.position)
 
-    def _measure(self) -> None:
-        """Step 8, the sums of the history, and whether the state means anything."""
-        physics = self.scene.config.physics
-        with self.clock.phase("step size, sums"):
-            self.totals = self._sum()
-            self.limit = step_size.limit(
-                physics.C, physics.energy_limit, self.particles, self._signal_speed
-            )
-        self._check()
-
-    def _sum(self) -> Totals:
-        p = self.particles
-        return Totals(
-            *_totals(
-                p.mass, p.velocity, p.internal_energy, p.density, p.acceleration, p.energy_rate
-            )
-        )  # fmt: skip
-
-    def _check(self) -> None:
-        """Raise NumericalError where a number is not finite, a density or energy not positive."""
-        t = self.totals
-        sums = (t.energy, t.max_density, t.rates, self.limit.dt)
-        sound = np.isfinite(sums).all()
-        if sound and t.min_density > 0 and t.min_internal_energy >= 0 and self.limit.dt > 0:
+    def _heat(self, dt: float) -> None:
+        """What heating does to the internal energies in dt, and its sum over the run."""
+        if self.scene.heating is None:
             return
         p = self.particles
-        tests = (
-            ("density", p.density, ~(p.density > 0)),
-            ("internal energy", p.internal_energy, ~(p.internal_energy >= 0)),
-            ("velocity", p.velocity, ~np.isfinite(p.velocity)),
-            ("acceleration", p.acceleration, ~np.isfinite(p.acceleration)),
-            ("rate of energy", p.energy_rate, ~np.isfinite(p.energy_rate)),
-            ("signal speed", self._signal_speed, ~np.isfinite(self._signal_speed)),
-        )
-        for name, values, bad in tests:
-            if bad.any():
-                i = int(np.argwhere(bad)[0][-1])
-                value = values[..., i]
-                where = ", ".join(f"{x:.6g}" for x in p.position[:, i])
-                raise NumericalError(
-                    f"step {self.step}, t = {self.time:.6g}: {name} of particle {p.id[i]} at "
-                    f"({where}) is {value}; {int(bad.any(axis=tuple(range(bad.ndim - 1))).sum())} "
-                    f"particle(s) are so.\nIts density {p.density[i]:.6g}, support "
-                    f"{p.support[i]:.6g}, internal energy {p.internal_energy[i]:.6g}.\n"
-                    "Try: a smaller physics.C, a larger physics.alpha, physics.energy_limit = true."
-                )
-        raise NumericalError(
-            f"step {self.step}, t = {self.time:.6g}: the time step came out as {self.limit.dt}."
-        )
+        before = p.internal_energy
+        p.internal_energy = self.scene.heating.heated(before, dt)
+        self.energy_added += float(p.mass @ (p.internal_energy - before))
+
+    def _measure(self, past: step_size.Past | None) -> None:
+        """Step 8, the sums of the history, and whether the state means anything."""
+        with self.clock.phase("step size, sums"):
+            self.totals = totals.of(self.particles, self.scene.external)
+            self.limit = step_size.limit(self._bounds, self.particles, self._signal_speed, past)
+            self.watchdog.check(self)

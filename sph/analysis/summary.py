@@ -43,12 +43,19 @@ def of_run(simulation, history: dict[str, np.ndarray], status: str, reason: str 
 def conservation(history, particles, eos, pressure, boundaries) -> dict[str, float | None]:
     """Drift of energy and momentum over the history.
 
-    energy_drift: (E - E_0)/|E_0| at the end, energy_drift_max its largest modulus at any step;
+    energy_drift: (E - E_0)/|E_0| at the end, where E leaves out what heating added, and
+    energy_drift_max its largest modulus at any step; energy_injected: what keeping internal
+    energies positive cost, a part of the drift and as it relative to |E_0|, or to the kinetic and
+    internal energy at the start where that is more;
     momentum_change: |P - P_0| over sum m (|v| + c_s) of the last state, the largest of the axes
     without walls, which take momentum up; None where there is no such axis.
     """
-    energy = history["total_energy"]
-    drift = (energy - energy[0]) / abs(energy[0])
+    energy = history["total_energy"] - history.get("energy_added", 0.0)
+    # potential energy may cancel the others, which are then what an error is measured by
+    scale_of_energy = max(
+        abs(energy[0]), history["kinetic_energy"][0] + history["internal_energy"][0]
+    )
+    drift = (energy - energy[0]) / scale_of_energy
     with np.errstate(invalid="ignore"):  # the last state of a run that failed
         sound_speed = eos.sound_speed(particles.density, pressure)
         speed = np.linalg.norm(particles.velocity, axis=0)
@@ -58,6 +65,7 @@ def conservation(history, particles, eos, pressure, boundaries) -> dict[str, flo
     return {
         "energy_drift": float(drift[-1]),
         "energy_drift_max": float(np.abs(drift).max()),
+        "energy_injected": float(history["energy_injected"][-1] / scale_of_energy),
         "momentum_change": max((float(abs(p[-1] - p[0])) / scale for p in momentum), default=None),
     }
 
@@ -115,7 +123,11 @@ def in_words(summary: dict) -> str:
         lines.append(f"  {name.replace('_', ' ')}: {value:.6g}")
     change = kept["momentum_change"]
     momentum = "walls take momentum up" if change is None else f"momentum to {change:.2g}"
-    lines.append(f"Kept: energy to {kept['energy_drift_max']:.2g} at worst; {momentum}.")
+    injected = kept["energy_injected"]
+    kept_positive = f" (of it {injected:.2g} keeps energies positive)" if injected else ""
+    lines.append(
+        f"Kept: energy to {kept['energy_drift_max']:.2g} at worst{kept_positive}; {momentum}."
+    )
     lines.append(
         f"Cost: {session['wall_seconds']:.3g} s, {session['cpu_seconds']:.3g} CPU s on "
         f"{cost['threads']} thread(s), of which {session['compile_cpu_seconds']:.2g} s compiling; "

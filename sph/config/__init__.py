@@ -58,6 +58,16 @@ class Physics(Section):
         description="artificial conductivity, which smooths contacts; none if not given",
         examples=[{"name": "pressure_jump", "strength": 1.0}],
     )
+    external: Annotated[Any, ModelChoice("sph.external")] | None = Field(
+        None,
+        description="field that pulls the gas from outside, with G = 1; none if not given",
+        examples=[{"name": "point_mass", "mass": 1.0}],
+    )
+    heating: Annotated[Any, ModelChoice("sph.heating")] | None = Field(
+        None,
+        description="source of internal energy other than the flow; none if not given",
+        examples=[{"name": "relaxation", "energy": 1.0, "time": 0.1}],
+    )
     eta: float = Field(
         1.6, gt=0, description="smoothing length in units of the local particle spacing"
     )
@@ -72,6 +82,10 @@ class Physics(Section):
     )
     energy_limit: bool = Field(
         True, description="limit the time step by u / |du/dt| so that heating is resolved"
+    )
+
+    max_energy_drift: float = Field(
+        0.02, gt=0, description="the run stops where total energy is off by more than this part"
     )
 
     @model_validator(mode="before")
@@ -105,11 +119,15 @@ class Physics(Section):
 
     def conductivity_model(self):
         """The artificial conductivity, a NamedTuple of `sph.conductivity`, or None."""
-        if self.conductivity is None:
-            return None
-        named = _named(self.conductivity)
-        model = registry.model_class("sph.conductivity", named["name"])
-        return model(**{key: value for key, value in named.items() if key != "name"})
+        return _model("sph.conductivity", self.conductivity)
+
+    def external_model(self):
+        """The external field, a NamedTuple of `sph.external`, or None."""
+        return _model("sph.external", self.external)
+
+    def heating_model(self):
+        """The source of internal energy, a NamedTuple of `sph.heating`, or None."""
+        return _model("sph.heating", self.heating)
 
     def viscosity_model(self):
         """The artificial viscosity, a NamedTuple of `sph.viscosity`."""
@@ -142,6 +160,14 @@ class Run(Section):
     threads: Count | Literal["all"] = Field(
         "all", description='processor threads; "all" uses every one there is'
     )
+
+
+def _model(package: str, choice: str | dict[str, Any] | None):
+    if choice is None:
+        return None
+    named = _named(choice)
+    model = registry.model_class(package, named["name"])
+    return model(**{key: value for key, value in named.items() if key != "name"})
 
 
 @dataclasses.dataclass(frozen=True)

@@ -12,7 +12,14 @@ from sph.problems.base import Section
 Gamma = Annotated[float, Field(gt=1)]
 
 # Bounds of the models' parameters: their NamedTuples know types and defaults, not bounds.
-_PARAMETERS = {"gamma": Gamma, "strength": Annotated[float, Field(ge=0)]}
+_PARAMETERS = {
+    "gamma": Gamma,
+    "strength": Annotated[float, Field(ge=0)],
+    "mass": Annotated[float, Field(ge=0)],
+    "softening": Annotated[float, Field(ge=0)],
+    "energy": Annotated[float, Field(gt=0)],
+    "time": Annotated[float, Field(gt=0)],
+}
 
 
 class Choice:

@@ -1,8 +1,15 @@
-"""Prediction and correction (seed eqs 1-6 and 29-31), in place."""
+"""Prediction and correction (seed eqs 1-6 and 29-31), in place.
 
+Internal energy stays positive by rule. Where half a step of cooling would take more than half of
+u, the straight line u + c is left, with its own value and slope, for u/2 e^(1 + 2 c/u), which never
+reaches zero. That is more energy than the pairs exchanged; the updates return how much, summed over
+particles, and the history shows it. With the step limit u/|du/dt| it is never needed.
+"""
+
+import numpy as np
 from numba import njit
 
-from sph.compiled import COMPILED
+from sph.compiled import COMPILED, INLINED
 
 
 @njit(**COMPILED)
@@ -23,7 +30,7 @@ def predict(dt, position, velocity, acceleration, velocity_full):
 
 @njit(**COMPILED)
 def predict_scalar(dt, value, rate, value_full):
-    """Half a step in place, the full step into value_full: eqs 3, 5, 6 and the first of 31."""
+    """Half a step in place, the full step into value_full: eq 6 and the first of 31."""
     for i in range(value.size):
         start = value[i]
         value_full[i] = start + rate[i] * dt
@@ -31,8 +38,43 @@ def predict_scalar(dt, value, rate, value_full):
 
 
 @njit(**COMPILED)
+def predict_energy(dt, energy, rate, mass, energy_full) -> float:
+    """Half a step in place (eq 3), the full step into energy_full (eq 5), both kept positive.
+
+    Returns the energy that the half step was given beyond rate dt/2.
+    """
+    given = 0.0
+    for i in range(energy.size):
+        energy_full[i], _ = _kept_positive(energy[i], rate[i] * dt)
+        energy[i], extra = _kept_positive(energy[i], 0.5 * rate[i] * dt)
+        given += mass[i] * extra
+    return given
+
+
+@njit(**COMPILED)
 def correct(dt, value, rate):
-    """The second half step with the new rate, arrays of any one shape (eqs 29-31)."""
+    """The second half step with the new rate, arrays of any one shape (eqs 29 and 31)."""
     flat, flat_rate = value.reshape(-1), rate.reshape(-1)
     for i in range(flat.size):
         flat[i] += 0.5 * flat_rate[i] * dt
+
+
+@njit(**COMPILED)
+def correct_energy(dt, energy, rate, mass) -> float:
+    """The same for the internal energy (eq 30), kept positive; returns the energy given."""
+    given = 0.0
+    for i in range(energy.size):
+        energy[i], extra = _kept_positive(energy[i], 0.5 * rate[i] * dt)
+        given += mass[i] * extra
+    return given
+
+
+@njit(**INLINED)
+def _kept_positive(energy, change):
+    """(u + change kept positive, what that added)."""
+    # in this order a number that is not one passes through, for the watchdog to find
+    if change < -0.5 * energy:
+        # from u = 0 there is nothing to take, and -inf gives e^-inf = 0
+        kept = 0.5 * energy * np.exp(1.0 + 2.0 * change / energy)
+        return kept, kept - (energy + change)
+    return energy + change, 0.0

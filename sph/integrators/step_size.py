@@ -1,4 +1,10 @@
-"""The global time step (seed eq 32) and the particle that sets it."""
+"""The global time step (seed eq 32), what else bounds it, and the particle that sets it.
+
+Eq 32 takes the rates of this moment for those of the whole step. Two bounds beside it hold where
+they change faster: a support may change by SUPPORT_CHANGE of itself, and a step may be GROWTH times
+as long as the one before, so that a flow that has just been stiff is not left in one leap. A field
+from outside, where there is one, bounds it by C (H/|a|)^(1/2). No step is longer than the run.
+"""
 
 from typing import NamedTuple
 
@@ -7,40 +13,93 @@ from numba import njit
 
 from sph.compiled import COMPILED
 
-CRITERIA = ("signal_speed", "energy")
+CRITERIA = ("signal_speed", "energy", "acceleration", "support", "growth", "end")
+
+SUPPORT_CHANGE = 0.2
+GROWTH = 1.5
 
 
 class StepLimit(NamedTuple):
-    """The step that the criteria allow, the ID of the particle that sets it, and by which."""
+    """The step that the criteria allow, the ID of the particle that sets it, and by which.
+
+    The particle is 0 where none does: "growth" and "end".
+    """
 
     dt: float
     particle: int
     criterion: str
 
 
+class Bounds(NamedTuple):
+    """Of a run: the Courant number C, whether u/|du/dt| and |a| bound the step, and its end."""
+
+    courant: float
+    energy: bool
+    acceleration: bool
+    end: float
+
+
+class Past(NamedTuple):
+    """The step just made: its length, the limit it was cut from, and H (N,) before it."""
+
+    dt: float
+    limit: float
+    support: np.ndarray
+
+
 @njit(**COMPILED)
-def _smallest(support, signal_speed, energy, energy_rate, identity, energy_limit):
+def _smallest(support, signal_speed, energy, energy_rate, acceleration, identity, energy_limit):
     best = np.inf
-    particle = -1
+    particle = 0
     criterion = 0
     for i in range(support.size):
         by_signal = 2.0 * support[i] / signal_speed[i]
         if by_signal < best or (by_signal == best and identity[i] < particle):
             best, particle, criterion = by_signal, identity[i], 0
-        if energy_limit:
+        # cold gas without any energy has none to lose, and heating it is no matter of accuracy
+        if energy_limit and energy[i] > 0.0:
             by_energy = energy[i] / abs(energy_rate[i])
             if by_energy < best or (by_energy == best and identity[i] < particle):
                 best, particle, criterion = by_energy, identity[i], 1
+        if acceleration is not None:
+            squared = 0.0
+            for d in range(acceleration.shape[0]):
+                squared += acceleration[d, i] ** 2
+            by_acceleration = np.sqrt(support[i] / np.sqrt(squared))
+            if by_acceleration < best or (by_acceleration == best and identity[i] < particle):
+                best, particle, criterion = by_acceleration, identity[i], 2
     return best, particle, criterion
 
 
-def limit(courant: float, energy_limit: bool, particles, signal_speed) -> StepLimit:
-    """Eq 32 for the corrected state: signal_speed (N,) is each particle's largest v_sig.
+@njit(**COMPILED)
+def _largest_change(support, before, identity):
+    """Largest |H/H_before - 1| or its inverse, and whose it is."""
+    largest = 0.0
+    particle = 0
+    for i in range(support.size):
+        change = abs(support[i] - before[i]) / min(support[i], before[i])
+        if change > largest or (change == largest and identity[i] < particle):
+            largest, particle = change, identity[i]
+    return largest, particle
 
-    With energy_limit False the term u/|du/dt| is left out, as in the seed's draft.
-    """
+
+def limit(bounds: Bounds, particles, signal_speed, past: Past | None) -> StepLimit:
+    """The coming step; signal_speed (N,) is each particle's largest v_sig; no past at the start."""
+    p = particles
     dt, particle, criterion = _smallest(
-        particles.support, signal_speed, particles.internal_energy, particles.energy_rate,
-        particles.id, energy_limit,
+        p.support, signal_speed, p.internal_energy, p.energy_rate,
+        p.acceleration if bounds.acceleration else None, p.id, bounds.energy,
     )  # fmt: skip
-    return StepLimit(courant * dt, int(particle), CRITERIA[criterion])
+    dt, criterion = bounds.courant * dt, CRITERIA[criterion]
+    if past is not None:
+        change, changed = _largest_change(p.support, past.support, p.id)
+        # less than this cannot become too much in one step; it may be the iteration of H, which
+        # goes on however short the step
+        noticed = change > SUPPORT_CHANGE / GROWTH
+        if noticed and change * dt > SUPPORT_CHANGE * past.dt:
+            dt, particle, criterion = SUPPORT_CHANGE * past.dt / change, changed, "support"
+        if dt > GROWTH * past.limit:
+            dt, particle, criterion = GROWTH * past.limit, 0, "growth"
+    if dt > bounds.end:
+        dt, particle, criterion = bounds.end, 0, "end"
+    return StepLimit(dt, int(particle), criterion)

@@ -25,6 +25,7 @@ def columns(dimension: int) -> list[str]:
         "kinetic_energy",
         "internal_energy",
         "total_energy",
+        "energy_injected",
         *(f"momentum_{axis}" for axis in "xyz"[:dimension]),
         "min_density",
         "max_density",

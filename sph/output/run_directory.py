@@ -67,6 +67,11 @@ class RunDirectory:
         return self.path / "summary.json"
 
     @property
+    def offenders(self) -> Path:
+        """Where a run that failed leaves the particles at which it did."""
+        return self.path / "offenders.h5"
+
+    @property
     def figures(self) -> Path:
         return self.path / "figures"
 
@@ -134,7 +139,7 @@ class RunDirectory:
         for tree in (self.figures, self.diagnostics):
             if tree.is_dir() and not tree.is_symlink():
                 shutil.rmtree(tree)
-        for path in (self.history, self.summary, *self.checkpoints()):
+        for path in (self.history, self.summary, self.offenders, *self.checkpoints()):
             path.unlink(missing_ok=True)
         self.write_config("")  # its mark stays: beside a user's files this is still a run directory
 

@@ -3,6 +3,7 @@
 import csv
 import itertools
 import json
+import re
 import shutil
 import signal
 from types import SimpleNamespace
@@ -513,16 +514,21 @@ def test_a_numerical_failure_names_the_particle_and_the_way_on(tmp_path, recwarn
         runner.run(configuration.from_text(STRONG), run, Watch())
     text = str(caught.value)
     assert caught.value.exit_code == 3
-    for words in ("of particle ", "Try: a smaller physics.C", str(run.checkpoint_path(0))):
+    for words in ("energy has changed by", "Try: a smaller physics.C", str(run.checkpoint_path(0))):
         assert words in text
+    offender = re.search(r"the most is with particle (\d+)", text)[1]
+    assert checkpoints.read(run.offenders).particles.id[0] == int(offender)
+    assert f"{run.offenders}, in the layout of a checkpoint" in text
+    assert len(text.splitlines()) <= 24  # one screen
     assert f"sph restart {run.checkpoint_path(0)} --set" in text
     summary = json.loads(run.summary.read_text())
     assert (summary["status"], summary["errors"]) == ("failed", None)
-    assert "of particle " in summary["reason"]
+    assert f"particle {offender}" in summary["reason"]
     assert len(rows(run)) == 1
     assert [str(warning.message) for warning in recwarn] == []
     go_on(run.checkpoint_path(0), "physics.C=0.15")
     assert json.loads(run.summary.read_text())["status"] == "done"
+    assert not run.offenders.exists()
     assert numbers(run) == [f"checkpoint_{k:06d}.h5" for k in range(3)]
 
 

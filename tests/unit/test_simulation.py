@@ -176,7 +176,7 @@ def test_a_bad_particle_is_named(begin, name, value):
     simulation = begin(TUBE, "physics.energy_limit=false")
     getattr(simulation.particles, name)[..., 7] = value
     with pytest.raises(NumericalError) as caught:
-        simulation._measure()
+        simulation._measure(past=None)
     words = name.replace("_", " ")
     assert f"{words} of particle {simulation.particles.id[7]} at (" in str(caught.value)
     assert f"{value}" in str(caught.value)

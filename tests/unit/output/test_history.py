@@ -29,7 +29,7 @@ def append(history, steps):
 
 def test_columns():
     expected = "step t dt limiter_particle limiter kinetic_energy internal_energy total_energy "
-    expected += "momentum_x momentum_y min_density max_density min_internal_energy "
+    expected += "energy_injected momentum_x momentum_y min_density max_density min_internal_energy "
     expected += "max_internal_energy wall_seconds cpu_seconds"
     assert columns(2) == expected.split()
     assert [name for name in columns(3) if name not in columns(1)] == ["momentum_y", "momentum_z"]

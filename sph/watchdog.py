@@ -1,0 +1,137 @@
+"""The watchdog: whether the state of a simulation still means something, after every step.
+
+Its tests use sums that the history needs anyway; particles are only looked at once one fails.
+"""
+
+import numpy as np
+
+from sph.errors import NumericalError
+
+# Steps over which the advance of time is compared with that of the run's own past, and by how much
+# it may fall behind: cold gas meeting a shock may take some hundred steps of next to no length.
+WINDOW = 1000
+COLLAPSE = 1e-6
+
+# How far outside an open domain a particle may be, in lengths of the domain along that axis.
+FAR = 100.0
+
+SMALLER_STEPS = "a smaller physics.C, a larger physics.alpha, physics.energy_limit = true"
+
+
+class Watchdog:
+    """Knows what a run began with; `check` raises NumericalError where its state means nothing."""
+
+    def __init__(self, scene):
+        self.max_drift = scene.config.physics.max_energy_drift
+        self.energy_at_start = None  # set by the first check, or for a restart from its history
+        self._scale = None
+        box, kinds = scene.domain.box, scene.domain.boundaries
+        open_axes = [axis for axis, kind in enumerate(kinds) if kind == "open"]
+        self._fences = [
+            (axis, lo - FAR * (hi - lo), hi + FAR * (hi - lo))
+            for axis in open_axes
+            for lo, hi in [box[axis]]
+        ]
+        self._marked = None  # (time, step) at which the present window began
+        self._longest = 0.0  # time covered by the best window
+
+    def check(self, simulation) -> None:
+        """Raise NumericalError, which names a particle, where `simulation` cannot go on."""
+        self._check_numbers(simulation)
+        self._check_energy(simulation)
+        self._check_fences(simulation)
+        self._check_pace(simulation)
+
+    def _check_numbers(self, simulation) -> None:
+        totals, dt = simulation.totals, simulation.limit.dt
+        sums = (totals.energy, totals.max_density, totals.rates, dt)
+        positive = totals.min_density > 0 and totals.min_internal_energy >= 0
+        if positive and np.isfinite(sums).all() and simulation.time + dt > simulation.time:
+            return
+        p = simulation.particles
+        tests = (
+            ("density", p.density, ~(p.density > 0) | ~np.isfinite(p.density)),
+            ("internal energy", p.internal_energy, ~(p.internal_energy >= 0)),
+            ("velocity", p.velocity, ~np.isfinite(p.velocity)),
+            ("acceleration", p.acceleration, ~np.isfinite(p.acceleration)),
+            ("rate of energy", p.energy_rate, ~np.isfinite(p.energy_rate)),
+        )
+        for name, values, bad in tests:
+            if bad.any():
+                i = int(np.argwhere(bad)[0][-1])
+                count = int(bad.any(axis=tuple(range(bad.ndim - 1))).sum())
+                where = ", ".join(f"{x:.6g}" for x in p.position[:, i])
+                raise fault(
+                    simulation,
+                    f"{name} of particle {p.id[i]} at ({where}) is {values[..., i]}; "
+                    f"{count} particle(s) are so",
+                    SMALLER_STEPS,
+                    int(p.id[i]),
+                )
+        raise fault(
+            simulation,
+            f"the time step came out as {dt}, set by {simulation.limit.criterion}",
+            SMALLER_STEPS,
+            simulation.limit.particle,
+        )
+
+    def _check_energy(self, simulation) -> None:
+        totals = simulation.totals
+        energy = totals.energy - simulation.energy_added
+        if self.energy_at_start is None:
+            self.energy_at_start = energy
+        # potential energy may cancel the others: they are what an error is measured by
+        scale = max(abs(self.energy_at_start), totals.kinetic_energy + totals.internal_energy)
+        drift = energy - self.energy_at_start
+        if abs(drift) > self.max_drift * scale:
+            p = simulation.particles
+            i = int(np.argmax(p.mass * (0.5 * (p.velocity**2).sum(axis=0) + p.internal_energy)))
+            raise fault(
+                simulation,
+                f"total energy has changed by {drift / scale:.3g} of itself, more than "
+                f"physics.max_energy_drift = {self.max_drift:g}; the most is with particle "
+                f"{p.id[i]}",
+                f"{SMALLER_STEPS}, or a larger physics.max_energy_drift if that is good enough",
+                int(p.id[i]),
+            )
+
+    def _check_fences(self, simulation) -> None:
+        p = simulation.particles
+        for axis, low, high in self._fences:
+            x = p.position[axis]
+            if x.min() < low or x.max() > high:
+                i = int(np.argmax(np.maximum(low - x, x - high)))
+                raise fault(
+                    simulation,
+                    f"particle {p.id[i]} is lost: its {'xyz'[axis]} = {x[i]:.6g} is more than "
+                    f"{FAR:g} lengths of the open domain outside it",
+                    f"a wider problem.domain if it belongs there, {SMALLER_STEPS} if not",
+                    int(p.id[i]),
+                )
+
+    def _check_pace(self, simulation) -> None:
+        if self._marked is None:
+            self._marked = simulation.time, simulation.step
+        time, step = self._marked
+        if simulation.step - step < WINDOW:
+            return
+        covered = simulation.time - time
+        if covered < COLLAPSE * self._longest:
+            raise fault(
+                simulation,
+                f"the time step has collapsed to {simulation.limit.dt:.3g}, set by "
+                f"{simulation.limit.criterion}: the last {WINDOW} steps covered {covered:.3g} of "
+                f"time, where {WINDOW} steps of this run have covered {self._longest:.3g}",
+                "physics.energy_limit = false where cold gas sets the step, else a larger "
+                "physics.alpha or more particles",
+                simulation.limit.particle,
+            )
+        self._longest = max(self._longest, covered)
+        self._marked = simulation.time, simulation.step
+
+
+def fault(simulation, what: str, remedy: str, particle: int) -> NumericalError:
+    """The error to raise: what broke and when, what to try, and the ID of a particle (0: none)."""
+    return NumericalError(
+        f"step {simulation.step}, t = {simulation.time:.6g}: {what}.\nTry: {remedy}.", particle
+    )

@@ -1,0 +1,130 @@
+"""Updates that keep internal energy positive, and every bound of the time step."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from sph.integrators import leapfrog, step_size
+from sph.integrators.step_size import Bounds, Past
+
+MASS = np.array([1.0, 2.0, 3.0, 4.0])
+
+
+def test_energies_take_a_straight_step_where_that_leaves_half():
+    energy, rate, full = np.array([1.0, 2.0]), np.array([-0.5, 3.0]), np.empty(2)
+    assert leapfrog.predict_energy(1.0, energy, rate, MASS[:2], full) == 0.0
+    assert full.tolist() == [0.5, 5.0]
+    assert energy.tolist() == [0.75, 3.5]
+    assert leapfrog.correct_energy(1.0, energy, rate, MASS[:2]) == 0.0
+    assert energy.tolist() == [0.5, 5.0]
+
+
+@pytest.mark.parametrize("cooling", [1.1, 10.0, 1e3, 1e300])
+def test_no_step_takes_all_energy_and_what_that_costs_is_told(cooling):
+    energy, full = np.array([1.0, 0.0, 3.0]), np.empty(3)
+    rate = np.array([-2.0 * cooling, -1.0, 1.0])
+    straight = energy + 0.5 * rate
+    given = leapfrog.predict_energy(1.0, energy, rate, MASS[:3], full)
+    assert (energy >= 0).all()
+    assert (full >= 0).all()
+    assert np.isfinite(energy).all()
+    assert energy[1] == full[1] == 0.0  # nothing is taken where there is nothing
+    # a sum of three products: a few roundings of the largest
+    assert given == pytest.approx(MASS[:3] @ (energy - straight), rel=1e-14)
+    start = energy.copy()
+    given = leapfrog.correct_energy(1.0, energy, rate, MASS[:3])
+    assert (energy >= 0).all()
+    assert given == pytest.approx(MASS[:3] @ (energy - start - 0.5 * rate), rel=1e-14)
+
+
+def test_the_curve_leaves_the_straight_line_with_its_value_and_slope():
+    change = -0.5 + np.array([-1e-6, 0.0, 1e-6])
+    energy = np.ones(3)
+    leapfrog.correct_energy(2.0, energy, change, MASS[:3])
+    # slope 1 on both sides; the curvature 2 makes 1e-12 of it over 1e-6, rounding 1e-10
+    assert np.diff(energy) / 1e-6 == pytest.approx([1.0, 1.0], abs=3e-6)
+    assert energy[1] == 0.5
+
+
+def test_a_number_that_is_none_is_not_hidden():
+    energy = np.array([np.nan, 1.0, 1.0])
+    leapfrog.correct_energy(1.0, energy, np.array([1.0, np.nan, -np.inf]), MASS[:3])
+    assert np.isnan(energy[:2]).all()
+
+
+# --- the time step ----------------------------------------------------------------------------
+
+
+def particles(**changed):
+    """Two particles; the first alone would take a step of 2 H/v_sig = 0.2."""
+    arrays = {
+        "support": np.array([0.1, 0.2]),
+        "internal_energy": np.ones(2),
+        "energy_rate": np.zeros(2),
+        "acceleration": np.zeros((1, 2)),
+        "id": np.array([8, 5]),
+    }
+    return SimpleNamespace(**arrays | changed)
+
+
+SIGNALS = np.array([1.0, 1.0])
+ALL = Bounds(courant=0.5, energy=True, acceleration=True, end=100.0)
+
+
+def test_the_signal_speed_bounds_the_step():
+    assert step_size.limit(ALL, particles(), SIGNALS, None) == (0.1, 8, "signal_speed")
+
+
+def test_heating_bounds_the_step_where_asked():
+    rates = np.array([0.0, -10.0])
+    limit = step_size.limit(ALL, particles(energy_rate=rates), SIGNALS, None)
+    assert limit == (0.05, 5, "energy")
+    free = ALL._replace(energy=False)
+    limit = step_size.limit(free, particles(energy_rate=rates), SIGNALS, None)
+    assert limit.criterion == "signal_speed"
+
+
+def test_gas_without_any_energy_does_not_stop_the_run():
+    cold = particles(internal_energy=np.zeros(2), energy_rate=np.array([1.0, 0.0]))
+    assert step_size.limit(ALL, cold, SIGNALS, None) == (0.1, 8, "signal_speed")
+
+
+def test_a_pull_from_outside_bounds_the_step():
+    pulled = particles(acceleration=np.array([[0.0, 2000.0]]))
+    # 0.5 sqrt(0.2/2000), two roots and a product of rounding
+    assert step_size.limit(ALL, pulled, SIGNALS, None) == (
+        pytest.approx(0.005, rel=1e-15), 5, "acceleration",
+    )  # fmt: skip
+    without = ALL._replace(acceleration=False)
+    assert step_size.limit(without, pulled, SIGNALS, None).criterion == "signal_speed"
+
+
+def test_a_support_may_not_change_by_more_than_its_part():
+    """It halved in a step of 0.01: at that pace 0.2 of it takes 0.002."""
+    past = Past(dt=0.01, limit=1.0, support=np.array([0.1, 0.4]))
+    limit = step_size.limit(ALL, particles(), SIGNALS, past)
+    assert limit == (pytest.approx(0.002, rel=1e-15), 5, "support")
+    grown = Past(dt=0.01, limit=1.0, support=np.array([0.1, 0.1]))
+    assert step_size.limit(ALL, particles(), SIGNALS, grown).dt == pytest.approx(0.002)
+
+
+def test_supports_that_settle_in_a_tiny_step_are_no_reason_for_another():
+    past = Past(dt=1e-9, limit=0.1, support=np.array([0.1, 0.201]))
+    assert step_size.limit(ALL, particles(), SIGNALS, past).criterion == "signal_speed"
+
+
+def test_a_step_grows_by_its_factor_at_most():
+    past = Past(dt=1e-3, limit=1e-3, support=np.array([0.1, 0.2]))
+    limit = step_size.limit(ALL, particles(), SIGNALS, past)
+    assert limit == (pytest.approx(1.5e-3), 0, "growth")
+
+
+def test_a_step_cut_to_land_on_an_output_does_not_shorten_the_next():
+    past = Past(dt=1e-9, limit=0.1, support=np.array([0.1, 0.2]))
+    assert step_size.limit(ALL, particles(), SIGNALS, past).dt == 0.1
+
+
+def test_gas_in_which_nothing_moves_takes_one_step():
+    limit = step_size.limit(ALL, particles(internal_energy=np.zeros(2)), np.zeros(2), None)
+    assert limit == (100.0, 0, "end")

@@ -1,0 +1,164 @@
+"""Every fault the watchdog looks for is found and named with a particle.
+
+Each test also shows what happens without its guard: the run goes on with what means nothing.
+"""
+
+import math
+
+import numpy as np
+import pytest
+
+from sph import config as configuration
+from sph import watchdog
+from sph.clock import Clock
+from sph.errors import NumericalError
+from sph.integrators import leapfrog, step_size
+from sph.scene import Scene
+from sph.simulation import Simulation
+
+TUBE = """
+[problem]
+name = "shock_tube"
+n = 60
+boundary = "{boundary}"
+[time]
+end = 0.2
+[output]
+interval = 0.2
+"""
+
+
+@pytest.fixture
+def begin():
+    begun = []
+
+    def start(*overrides, boundary="mirror"):
+        config = configuration.from_text(TUBE.format(boundary=boundary)).override(overrides)
+        begun.append(Simulation.start(Scene(config), 1, Clock()))
+        return begun[-1]
+
+    yield start
+    for simulation in begun:
+        simulation.close()
+        simulation.clock.close()
+
+
+def run(simulation, until=0.2):
+    while simulation.time < until:
+        simulation.advance(until)
+
+
+def test_a_sound_run_is_left_alone(begin):
+    run(begin())
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "words"),
+    [
+        ("internal_energy", -1.0, "internal energy"),
+        ("internal_energy", np.nan, "internal energy"),
+        ("velocity", np.inf, "velocity"),
+        ("density", 0.0, "density"),
+        ("density", np.inf, "density"),
+        ("acceleration", np.nan, "acceleration"),
+        ("energy_rate", -np.inf, "rate of energy"),
+    ],
+)
+def test_numbers_that_mean_nothing(begin, name, value, words):
+    simulation = begin("physics.energy_limit=false")
+    getattr(simulation.particles, name)[..., 7] = value
+    with pytest.raises(NumericalError, match=f"{words} of particle") as caught:
+        simulation._measure(past=None)
+    assert caught.value.particle == simulation.particles.id[7]
+
+
+def test_energy_that_comes_from_nowhere(begin, monkeypatch):
+    """At four times the shipped step the tube gains energy, though every number is finite."""
+    unstable = "physics.C=0.6", "physics.energy_limit=false"
+    with pytest.raises(NumericalError, match=r"physics\.max_energy_drift = 0\.02") as caught:
+        run(begin(*unstable))
+    assert caught.value.particle > 0
+    monkeypatch.setattr(watchdog.Watchdog, "_check_energy", lambda *_: None)
+    unwatched = begin(*unstable)
+    before = unwatched.totals.energy
+    run(unwatched)
+    assert abs(unwatched.totals.energy / before - 1) > 0.02  # a wrong answer, called done
+
+
+def test_energy_that_heating_adds_is_no_drift(begin):
+    warm = begin('physics.heating={name="relaxation",energy=20.0,time=0.01}')
+    before = warm.totals.energy
+    run(warm, 0.05)
+    assert warm.totals.energy > 2 * before
+
+
+def test_a_particle_lost_from_an_open_domain(begin, monkeypatch):
+    simulation = begin(boundary="open")
+    simulation.particles.position[0, 3] = -102.0  # the domain is 1 long
+    with pytest.raises(NumericalError, match="is lost: its x = -102 ") as caught:
+        simulation.watchdog.check(simulation)
+    assert caught.value.particle == simulation.particles.id[3]
+    simulation.particles.position[0, 3] = -99.0
+    simulation.watchdog.check(simulation)
+
+
+def test_a_step_that_collapses(begin, monkeypatch):
+    """Steps shrink for good to a billionth of what the run took before."""
+    monkeypatch.setattr(watchdog, "WINDOW", 20)
+    simulation = begin()
+    for _ in range(25):
+        simulation.advance(math.inf)
+    allowed = step_size.limit
+
+    def shrunk(bounds, particles, signals, past):
+        limit = allowed(bounds, particles, signals, None)
+        return limit._replace(dt=1e-9 * limit.dt)
+
+    monkeypatch.setattr(step_size, "limit", shrunk)
+    with pytest.raises(NumericalError, match=r"the time step has collapsed to .* set by") as caught:
+        run(simulation, math.inf)
+    assert "physics.energy_limit = false" in str(caught.value)
+    assert simulation.step < 25 + 41  # within two windows
+
+
+def test_a_step_too_small_to_move_time(begin, monkeypatch):
+    simulation = begin()
+    simulation.advance(math.inf)
+    allowed = step_size.limit
+    monkeypatch.setattr(step_size, "limit", lambda *a: allowed(*a)._replace(dt=1e-30))
+    with pytest.raises(NumericalError, match="the time step came out as 1e-30"):
+        simulation.advance(math.inf)
+
+
+def test_without_its_rule_internal_energy_becomes_negative(begin, monkeypatch):
+    """Two cold streams part at Mach 10: adiabatic cooling outruns a step that ignores it."""
+    parting = (
+        "problem.left={density=1.0,velocity=-10.0,pressure=0.7}",
+        "problem.right={density=1.0,velocity=10.0,pressure=0.7}",
+        "physics.energy_limit=false",
+        "physics.C=0.4",
+    )
+    simulation = begin(*parting, boundary="open")
+    run(simulation, 0.03)
+    assert simulation.particles.internal_energy.min() > 0
+    assert simulation.energy_injected > 0
+
+    def straight(dt, energy, rate, mass, full=None):
+        if full is not None:
+            full[:] = energy + rate * dt
+        energy += 0.5 * rate * dt
+        return 0.0
+
+    monkeypatch.setattr(leapfrog, "predict_energy", straight)
+    monkeypatch.setattr(leapfrog, "correct_energy", straight)
+    with pytest.raises(NumericalError):
+        run(begin(*parting, boundary="open"), 0.03)
+
+
+def test_the_watchdog_costs_next_to_nothing_where_all_is_well(begin, monkeypatch):
+    """It looks at no particle: with the arrays taken away it still says that all is well."""
+    simulation = begin()
+    particles = simulation.particles
+    simulation.particles = None
+    simulation.watchdog.check(simulation)
+    simulation.particles = particles
