@@ -116,14 +116,18 @@ def new(problem, target):
 
 @main.command("list")
 def list_choices():
-    """Name the problems, kernels, schemes and the other choices there are."""
+    """Name the problems, kernels, schemes, the other choices and the stress cases there are."""
     from sph import registry
+    from sph.stress.case import load as stress_cases
 
     for package in ("problems", "kernels", "schemes", "eos", "conductivity"):
         click.echo(f"{package}:")
         for name in registry.names(f"sph.{package}"):
             module = registry.load(f"sph.{package}", name)
             click.echo(f"  {name:24s} {module.__doc__.strip().splitlines()[0]}")
+    click.echo("stress cases:")
+    for case in stress_cases():
+        click.echo(f"  {case.name:24s} {case.title}")
 
 
 def _with_threads(overrides, threads):
@@ -132,6 +136,7 @@ def _with_threads(overrides, threads):
 
 main.add_command(cli_studies.sweep)
 main.add_command(cli_studies.report)
+main.add_command(cli_studies.stress)
 
 if __name__ == "__main__":
     main()

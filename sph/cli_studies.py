@@ -1,8 +1,10 @@
-"""The commands over many runs: `sph sweep` and `sph report`."""
+"""The commands over many runs: `sph sweep`, `sph report` and `sph stress`."""
 
 from pathlib import Path
 
 import click
+
+from sph.errors import NumericalError
 
 
 @click.command()
@@ -60,3 +62,29 @@ def report(sources, field, norm, cost, by, reference, directory):
     click.echo(reports.in_words(found))
     for path in reports.write(found, target):
         click.echo(f"wrote {path}")
+
+
+@click.command()
+@click.option("--only", multiple=True, metavar="NAME",
+              help="Run this case alone, or all that match a pattern such as 'noh_*'; may be "
+              "repeated. `sph list` names them.")  # fmt: skip
+@click.option("-o", "directory", type=click.Path(path_type=Path), metavar="DIR",
+              default=Path("runs/stress"), show_default=True,
+              help="Where the runs go.")  # fmt: skip
+@click.option("--jobs", type=click.IntRange(min=1), metavar="N",
+              help="Runs at once; as many as there are processors if not given.")  # fmt: skip
+def stress(only, directory, jobs):
+    """Run the suite of hard cases and judge each by its limits; exits with 3 if one falls short.
+
+    Settings that are to fail must be caught failing. Run again, it does only what is missing.
+    """
+    from sph.stress import command, table
+
+    suite, results = command.run(only, directory, jobs)
+    click.echo(table.as_text(results))
+    for sentence in table.sentences(suite.cases, results):
+        click.echo(sentence)
+    click.echo(f"Results: {directory} (stress.json, stress.md, and a directory for each case).")
+    if not table.is_passed(results):
+        raise NumericalError(table.closing(results))
+    click.echo(table.closing(results))

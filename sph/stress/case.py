@@ -1,0 +1,163 @@
+"""A case of the stress suite: a TOML file in `cases/` beside this one, found by its name.
+
+It is a configuration, as `sph run` takes it, with more beside:
+
+    title, hard        what it is, and what is hard about it
+    [limits]           figure = { at_most, at_least, why }, see `figures`: what a right answer keeps
+    [reaches]          figure = { ideal, why }: how far SPH gets where it cannot get there
+    [settings.NAME]    about; set, keys as `--set` takes them; limits of its own, on top;
+                       fails = { limit | exit, because }: it is to fail, by that limit, or by
+                       ending with exit code 3 and these words
+"""
+
+import fnmatch
+import tomllib
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import tomli_w
+from pydantic import Field, ValidationError, model_validator
+
+from sph.config import SECTIONS
+from sph.config.errors import suggestion
+from sph.errors import ConfigError, FileError
+from sph.problems.base import Section
+
+FOLDER = Path(__file__).parent / "cases"
+TABLES = ("problem", *SECTIONS)  # of the configuration in a case
+
+
+class Bound(Section):
+    """What a figure must keep, and where the number comes from."""
+
+    at_most: float | None = None
+    at_least: float | None = None
+    why: str = Field(min_length=1)
+
+    @model_validator(mode="after")
+    def _bounds_something(self):
+        if self.at_most is None and self.at_least is None:
+            raise ValueError("expected at_most, at_least or both")
+        return self
+
+    def holds(self, value: float) -> bool:
+        """Whether `value` is within; NaN, a figure that is not there, never is."""
+        above = self.at_least is None or value >= self.at_least
+        below = self.at_most is None or value <= self.at_most
+        return above and below and value == value
+
+    def closeness(self, value: float) -> float:
+        """How near `value` is to the bound, 1 on it and more beyond; for positive bounds."""
+        if value != value:
+            return float("inf")
+        shares = [0.0 if self.holds(value) else 1.0]
+        if self.at_most is not None and self.at_most > 0.0:
+            shares.append(value / self.at_most)
+        if self.at_least is not None and self.at_least > 0.0:
+            shares.append(self.at_least / value if value > 0.0 else float("inf"))
+        return max(shares)
+
+    def __str__(self) -> str:
+        low = "" if self.at_least is None else f"at least {self.at_least:g}"
+        high = "" if self.at_most is None else f"at most {self.at_most:g}"
+        return " and ".join(filter(None, (low, high)))
+
+
+# What every case keeps unless it gives a bound of its own for the figure, with its reason.
+ALWAYS = {
+    "conservation.energy_drift_max": Bound(
+        at_most=1e-3, why="the scheme conserves energy but for the error of the time integration"
+    ),
+    "history.min_internal_energy.min": Bound(at_least=0.0, why="a gas has no negative heat"),
+}
+
+
+class Reach(Section):
+    """A figure in which SPH falls short of the exact answer."""
+
+    ideal: float
+    why: str = Field(min_length=1)
+
+
+class Failing(Section):
+    """How a setting is to fail: by breaking a limit, or by ending with these words."""
+
+    limit: str | None = None
+    exit: str | None = None
+    because: str = Field(min_length=1)
+
+    @model_validator(mode="after")
+    def _in_one_way(self):
+        if (self.limit is None) == (self.exit is None):
+            raise ValueError("expected limit or exit, one of the two")
+        return self
+
+
+class Setting(Section):
+    """One way of running a case."""
+
+    about: str = Field(min_length=1)
+    set: list[str] = Field(default=[])
+    limits: dict[str, Bound] = Field(default={})
+    fails: Failing | None = None
+
+
+class Case(Section):
+    """A hard case: a configuration, what it must keep, and the settings to run it with."""
+
+    name: str
+    title: str = Field(min_length=1)
+    hard: str = Field(min_length=1)
+    configuration: dict[str, dict[str, Any]]
+    limits: dict[str, Bound] = Field(default={})
+    reaches: dict[str, Reach] = Field(default={})
+    settings: dict[str, Setting] = Field(min_length=1)
+
+    @model_validator(mode="after")
+    def _limits_exist(self):
+        for name, setting in self.settings.items():
+            limit = setting.fails and setting.fails.limit
+            if limit and limit not in self.bounds(name):
+                raise ValueError(f"settings.{name} is to fail by {limit}, which has no limit")
+        if all(setting.fails for setting in self.settings.values()):
+            raise ValueError("no setting is expected to pass")
+        return self
+
+    def bounds(self, setting: str) -> dict[str, Bound]:
+        """All limits of a setting by figure: its own before the case's before everyone's."""
+        return ALWAYS | self.limits | self.settings[setting].limits
+
+    def to_toml(self) -> str:
+        """The configuration that the settings change."""
+        return tomli_w.dumps(self.configuration)
+
+
+def read(path: Path) -> Case:
+    """The case in a file. Raises FileError where it is none."""
+    try:
+        content = tomllib.loads(path.read_text(encoding="utf-8"))
+        tables = {name: content.pop(name) for name in TABLES if name in content}
+        return Case(name=path.stem, configuration=tables, **content)
+    except (OSError, tomllib.TOMLDecodeError, TypeError, ValidationError) as error:
+        raise FileError(f"{path} is not a case of the stress suite: {error}") from None
+
+
+def names() -> list[str]:
+    """Names of the cases there are."""
+    return sorted(path.stem for path in FOLDER.glob("*.toml"))
+
+
+def load(only: Sequence[str] = ()) -> list[Case]:
+    """The cases of these names or patterns such as `noh_*`, all if none is given.
+
+    Raises ConfigError where there is no such case.
+    """
+    there = names()
+    chosen = set() if only else set(there)
+    for pattern in only:
+        found = fnmatch.filter(there, pattern)
+        if not found:
+            raise ConfigError(f'there is no case "{pattern}"; {suggestion(pattern, there)}')
+        chosen.update(found)
+    return [read(FOLDER / f"{name}.toml") for name in sorted(chosen)]

@@ -1,0 +1,105 @@
+"""The stress suite from its command line to its closing words.
+
+Each case is a sweep in a directory of its own, whose points are the case's settings: they share one
+pool of processes, and what is done is not done again.
+"""
+
+import sys
+import tempfile
+from collections.abc import Sequence
+from pathlib import Path
+
+from sph.errors import Stopped
+from sph.output.files import explained, write_text
+from sph.stress import table
+from sph.stress.case import Case, load
+from sph.stress.verdict import Result, judge
+from sph.sweep import local
+from sph.sweep.manifest import SweepDirectory
+from sph.sweep.plan import Plan, Point
+from sph.sweep.task import Outcome, Task, tasks
+
+
+class Suite:
+    """Cases in a directory, and the task of each of their settings."""
+
+    def __init__(self, cases: Sequence[Case], directory: Path):
+        self.cases = list(cases)
+        self.directory = directory
+        self.runs: dict[str, tuple[Case, str, Task]] = {}
+        for case in self.cases:
+            plan = Plan((), {}, tuple(_point(case, name) for name in case.settings))
+            sweep = SweepDirectory(directory.absolute() / case.name)
+            _prepare(sweep, case, plan)
+            for name, task in zip(case.settings, tasks(sweep, plan), strict=True):
+                self.runs[task.point.name] = case, name, task
+
+    def result(self, name: str) -> Result:
+        """The result of a run that has ended."""
+        return judge(*self.runs[name])
+
+    def results(self) -> list[Result]:
+        return [self.result(name) for name in self.runs]
+
+
+def run(
+    only: Sequence[str], directory: Path, jobs: int | None = None
+) -> tuple[Suite, list[Result]]:
+    """Bring the cases of these names to their end and judge them; writes stress.json and .md.
+
+    Raises ConfigError and FileError before anything runs, Stopped where a run was stopped.
+    """
+    suite = Suite(load(only), directory)
+    missing = [task for _, _, task in suite.runs.values() if not _has_ended(task)]
+    told = _Told(suite, len(missing))
+    local.run(missing, jobs, told)
+    if told.stopped:
+        raise Stopped(
+            f"{told.stopped} of {len(suite.runs)} runs have not ended; the same command goes on "
+            "with them."
+        )
+    results = suite.results()
+    with explained(f"cannot write to {directory}"):
+        write_text(directory / "stress.json", table.as_json(suite.cases, results))
+        write_text(directory / "stress.md", table.as_markdown(suite.cases, results))
+    return suite, results
+
+
+class _Told:
+    """A line for each run that ends, with its verdict."""
+
+    def __init__(self, suite: Suite, missing: int):
+        self.suite = suite
+        self.all = len(suite.runs)
+        self.ended = self.all - missing
+        self.stopped = 0
+        if self.ended:
+            self._say(f"{self.ended} of {self.all} runs are done already")
+
+    def __call__(self, outcome: Outcome) -> None:
+        if outcome.status == "stopped":
+            self.stopped += 1
+            self._say(f"{outcome.name} stopped: {outcome.reason}")
+            return
+        self.ended += 1
+        verdict = self.suite.result(outcome.name).verdict
+        self._say(f"[{self.ended:{len(str(self.all))}d}/{self.all}] {outcome.name}: {verdict}")
+
+    def _say(self, line: str) -> None:
+        print(line, file=sys.stderr, flush=True)
+
+
+def _point(case: Case, setting: str) -> Point:
+    return Point(f"{case.name}.{setting}", tuple(case.settings[setting].set))
+
+
+def _prepare(sweep: SweepDirectory, case: Case, plan: Plan) -> None:
+    with tempfile.TemporaryDirectory() as folder:
+        base = Path(folder) / f"{case.name}.toml"
+        base.write_text(case.to_toml(), encoding="utf-8")
+        sweep.prepare(base, plan)
+
+
+def _has_ended(task: Task) -> bool:
+    """Whether a run is done or came to numbers that mean nothing, which is a result too."""
+    return task.status in ("done", "failed")

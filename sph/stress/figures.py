@@ -1,0 +1,107 @@
+"""Figures of a run that limits are set on, each by a name of parts between dots.
+
+errors.FIELD.NORM          as the summary has them: against the exact solution
+relative.FIELD.NORM        the same, of (value - exact)/|exact| of each particle
+report.NAME                figures of the problem
+conservation.NAME, cost.NAME, steps, particles, time
+history.COLUMN.KIND        over all steps; KIND is first, last, min or max
+state.FIELD.KIND           over the particles at the end; KIND is min or max
+change.FIELD               largest |last - first| of a particle, over its own first value for
+                           scalars, over the largest first length for vectors
+"""
+
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+
+from sph.analysis.errors import norms
+from sph.output import checkpoint as checkpoints
+from sph.output.checkpoint import Checkpoint
+from sph.output.history import read as read_history
+from sph.output.run_directory import RunDirectory
+
+KINDS = (
+    "errors", "relative", "report", "conservation", "cost", "steps", "particles", "time",
+    "history", "state", "change",
+)  # fmt: skip
+NONE = float("nan")  # the value of a figure that a run does not have
+
+OF_HISTORY = {"first": lambda x: x[0], "last": lambda x: x[-1], "min": np.min, "max": np.max}
+OF_STATE = {"min": np.min, "max": np.max}
+
+
+class Figures:
+    """Figures of the run in a directory that has ended, each worked out when it is asked for."""
+
+    def __init__(self, directory: Path, summary: dict):
+        self.run = RunDirectory(directory)
+        self.summary = summary
+
+    def value(self, name: str) -> float:
+        """The figure of that name, NaN where this run has none. Raises FileError."""
+        kind, *rest = name.split(".")
+        makers = {
+            "errors": self._error, "relative": self._relative, "history": self._of_history,
+            "state": self._of_state, "change": self._change,
+        }  # fmt: skip
+        try:
+            return float(makers[kind](*rest) if kind in makers else self._said(kind, *rest))
+        except (KeyError, AttributeError, IndexError, TypeError, ValueError):
+            return NONE
+
+    @cached_property
+    def _history(self) -> dict[str, np.ndarray]:
+        return read_history(self.run.history)
+
+    @cached_property
+    def _first(self) -> Checkpoint:
+        return checkpoints.read(self.run.checkpoints()[0])
+
+    @cached_property
+    def _last(self) -> Checkpoint:
+        return checkpoints.read(self.run.checkpoints()[-1])
+
+    def _said(self, *names: str):
+        found = self.summary
+        for name in names:
+            found = found[name]
+        return found
+
+    def _error(self, field: str, norm: str):
+        return self._said("errors", "fields", field, norm)
+
+    def _of_history(self, column: str, kind: str):
+        return OF_HISTORY[kind](self._history[column])
+
+    def _of_state(self, field: str, kind: str):
+        return OF_STATE[kind](_length(_field(self._last, field)))
+
+    def _change(self, field: str):
+        before, after = (_by_id(one, field) for one in (self._first, self._last))
+        size = np.abs(before) if before.ndim == 1 else _length(before).max()
+        return (np.abs(_length(after - before)) / size).max()
+
+    def _relative(self, field: str, norm: str):
+        state, eos = self._last, self._last.config.physics.eos_model()
+        problem, position = state.config.problem, state.particles.position
+        exact = problem.exact(eos, state.time, position)[field]
+        inside, _ = problem.error_region(eos, state.time, position)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            difference = (_field(state, field) - exact) / np.abs(_length(exact))
+        volume = state.particles.mass / state.particles.density
+        return norms(difference[..., inside], volume[inside])[norm]
+
+
+def _field(state: Checkpoint, name: str) -> np.ndarray:
+    """(N,) or (D, N) of the particles, pressure included."""
+    return state.pressure if name == "pressure" else getattr(state.particles, name)
+
+
+def _by_id(state: Checkpoint, name: str) -> np.ndarray:
+    return _field(state, name)[..., np.argsort(state.particles.id)]
+
+
+def _length(values: np.ndarray) -> np.ndarray:
+    """Scalars (N,) as they are, vectors (D, N) as their lengths (N,)."""
+    return np.linalg.norm(values, axis=0) if values.ndim == 2 else values

@@ -1,0 +1,108 @@
+"""Judge the runs of a case: what passes, what falls short, what fails as its file says."""
+
+from dataclasses import dataclass
+
+from sph.analysis.report.runs import Row
+from sph.analysis.report.runs import read as read_runs
+from sph.stress.case import ALWAYS, Bound, Case, Failing
+from sph.stress.figures import NONE, Figures
+from sph.sweep.task import Task, standing
+
+PASS = "pass"
+SHORT = "falls short"
+AS_WRITTEN = "fails as written"
+OTHERWISE = "fails otherwise than written"
+UNEXPECTED = "passes, though written to fail"
+
+
+@dataclass(frozen=True)
+class Check:
+    """A figure beside what it must keep."""
+
+    figure: str
+    value: float
+    bound: Bound
+
+    @property
+    def holds(self) -> bool:
+        return self.bound.holds(self.value)
+
+    def __str__(self) -> str:
+        value = "is not there" if self.value != self.value else f"is {self.value:.3g}"
+        return f"{self.figure} {value}, expected {self.bound}"
+
+
+@dataclass(frozen=True)
+class Result:
+    """How a setting of a case ended."""
+
+    case: str
+    setting: str
+    verdict: str
+    reason: str  # in words; empty for a pass
+    checks: tuple[Check, ...]
+    reaches: dict[str, float]
+    numbers: dict[str, float | int | str]
+
+    @property
+    def name(self) -> str:
+        return f"{self.case}.{self.setting}"
+
+    @property
+    def is_expected(self) -> bool:
+        return self.verdict in (PASS, AS_WRITTEN)
+
+    @property
+    def worst(self) -> Check | None:
+        """The check nearest to its bound, or farthest beyond; those of every case have columns."""
+        own = [check for check in self.checks if check.figure not in ALWAYS]
+        return max(own, key=lambda check: check.bound.closeness(check.value), default=None)
+
+
+def judge(case: Case, setting: str, task: Task) -> Result:
+    """The result of a run that has ended, by its files. Raises FileError."""
+    (row,) = read_runs([task.run.path]) if task.status else (None,)
+    figures = Figures(task.run.path, row.summary if row else {})
+    checks = tuple(
+        Check(name, figures.value(name) if row else NONE, bound)
+        for name, bound in case.bounds(setting).items()
+    )
+    ended = "" if task.status == "done" else (row.reason if row else standing(task).reason)
+    verdict, reason = _verdict(case.settings[setting].fails, checks, ended)
+    reaches = {name: figures.value(name) for name in case.reaches} if row else {}
+    return Result(case.name, setting, verdict, reason, checks, reaches, _numbers(row, figures))
+
+
+def _verdict(fails: Failing | None, checks: tuple[Check, ...], ended: str) -> tuple[str, str]:
+    """The verdict and its reason; `ended`: why the run ended early, empty where it did not."""
+    found = _first_line(ended) or "; ".join(str(check) for check in checks if not check.holds)
+    if fails is None:
+        return (SHORT, found) if found else (PASS, "")
+    if not found:
+        return UNEXPECTED, f"it was to fail because {fails.because}"
+    broken = {check.figure for check in checks if not check.holds}
+    by_exit = fails.exit is not None and fails.exit in ended
+    by_limit = fails.limit in broken and not ended
+    if by_exit or by_limit:
+        return AS_WRITTEN, f"fails because {fails.because} ({found})"
+    return OTHERWISE, f"{found}; it was to fail because {fails.because}"
+
+
+def _numbers(row: Row | None, figures: Figures) -> dict:
+    """The columns that every case has."""
+    if row is None:
+        return {}
+    return {
+        "scheme": row.value("physics.scheme"),
+        "particles": row.n,
+        "energy_drift": figures.value("conservation.energy_drift_max"),
+        "lowest_internal_energy": figures.value("history.min_internal_energy.min"),
+        "lowest_density": figures.value("history.min_density.min"),
+        "steps": row.steps,
+        "smallest_step": figures.value("history.dt.min"),
+        "cpu_seconds": row.cost["cpu"],
+    }
+
+
+def _first_line(text: str) -> str:
+    return text.partition("\n")[0]

@@ -1,0 +1,213 @@
+"""The stress suite: cases as files, and verdicts on runs of an artificial case."""
+
+import json
+import tomllib
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner
+
+import sph
+from sph import config as configuration
+from sph.cli import main
+from sph.errors import ConfigError, FileError
+from sph.stress import case as cases
+from sph.stress import figures
+from sph.stress.case import Bound
+
+# Gas at rest on a lattice, where nothing happens, so that each figure is known beforehand.
+STILL = """\
+title = "gas at rest"
+hard = "it is not: it shows the verdicts"
+[problem]
+name = "uniform"
+dimension = 1
+n = 20
+[physics]
+C = 0.15
+[time]
+end = 0.02
+[output]
+interval = 0.02
+[limits]
+"change.internal_energy" = { at_most = 1e-6, why = "nothing happens" }
+"history.max_density.max" = { at_most = 2.0, why = "the density is 1" }
+[reaches]
+"errors.density.L1" = { ideal = 0.0, why = "the lattice sums to 0.25 % too much" }
+[settings.right]
+about = "passes"
+"""
+IMPOSSIBLE = """
+[settings.impossible]
+about = "no density is below one half"
+limits = { "history.max_density.max" = { at_most = 0.5, why = "it cannot be kept" } }
+"""
+CAUGHT = """
+[settings.caught]
+about = "the same, written to fail"
+limits = { "history.max_density.max" = { at_most = 0.5, why = "it cannot be kept" } }
+fails = { limit = "history.max_density.max", because = "the density is 1" }
+[settings.refused]
+about = "a support wider than the box allows"
+set = ["problem.boundary=mirror", "physics.eta=30.0"]
+fails = { exit = "wider than the mirror box", because = "it holds fewer particles than asked for" }
+[settings.overflown]
+about = "numbers near the largest there are"
+set = ["problem.noise=0.5", "problem.pressure=1e300"]
+fails = { exit = "particle", because = "products of them are not finite" }
+"""
+UNEXPECTED = """
+[settings.unexpected]
+about = "keeps the limit that it is to break"
+fails = { limit = "history.max_density.max", because = "we believe so" }
+"""
+OTHERWISE = """
+[settings.otherwise]
+about = "breaks another limit than the one written"
+limits = { "steps" = { at_most = 0, why = "it cannot be kept" } }
+fails = { limit = "history.max_density.max", because = "we believe so" }
+"""
+
+
+@pytest.fixture
+def stress(tmp_path, monkeypatch):
+    """stress(text): write that case, run the suite; the click result and the records by setting."""
+    monkeypatch.setattr(cases, "FOLDER", tmp_path)
+
+    def run(text, *arguments):
+        (tmp_path / "still.toml").write_text(text)
+        target = tmp_path / "out"
+        result = CliRunner().invoke(main, ["stress", "-o", str(target), *arguments])
+        (found,) = json.loads((target / "stress.json").read_text())["cases"]
+        return result, found, {one["setting"]: one for one in found["settings"]}
+
+    return run
+
+
+def test_a_suite_that_ends_as_written_passes(stress, tmp_path):
+    result, case, settings = stress(STILL + CAUGHT)
+    assert result.exit_code == 0, result.output
+    assert case["passes"]
+    assert settings["right"]["verdict"] == "pass"
+    assert {settings[name]["verdict"] for name in ("caught", "refused", "overflown")} == {
+        "fails as written"
+    }
+    assert settings["caught"]["reason"].startswith("fails because the density is 1 (")
+    assert "1 of 1 cases pass; 3 settings that are to fail were caught" in result.output
+    # the floor of the density sum of a lattice at eta = 1.6 in one dimension, 1.002456
+    assert settings["right"]["reaches"]["errors.density.L1"]["value"] == pytest.approx(
+        0.002456, abs=1e-6
+    )
+    assert "still reaches errors.density.L1 = 0.00246 (right), where 0 would be right" in (
+        result.output
+    )
+    assert "| still | right | grad_h | pass |" in (tmp_path / "out" / "stress.md").read_text()
+
+
+@pytest.mark.parametrize(
+    ("more", "setting", "verdict"),
+    [
+        (IMPOSSIBLE, "impossible", "falls short"),
+        (UNEXPECTED, "unexpected", "passes, though written to fail"),
+        (OTHERWISE, "otherwise", "fails otherwise than written"),
+    ],
+)
+def test_a_case_that_ends_otherwise_than_written_exits_with_3(stress, more, setting, verdict):
+    result, case, settings = stress(STILL + more)
+    assert result.exit_code == 3, result.output
+    assert not case["passes"]
+    assert settings["right"]["verdict"] == "pass"
+    assert settings[setting]["verdict"] == verdict
+    assert "0 of 1 cases pass; 0 settings that are to fail were caught" in result.stderr
+    assert f"Short: still ({setting} {verdict})." in result.stderr
+
+
+def test_what_has_ended_is_not_run_again_and_is_judged_anew(stress, tmp_path):
+    stress(STILL)
+    summary = tmp_path / "out" / "still" / "still.right" / "summary.json"
+    before = summary.stat().st_mtime_ns
+    result, _, settings = stress(STILL + IMPOSSIBLE)
+    assert result.exit_code == 3
+    assert set(settings) == {"right", "impossible"}
+    result, _, settings = stress(STILL.replace("at_most = 2.0", "at_most = 0.9") + IMPOSSIBLE)
+    assert "2 of 2 runs are done already" in result.stderr
+    assert settings["right"]["verdict"] == "falls short"
+    assert summary.stat().st_mtime_ns == before
+
+
+def test_only_named_cases_run(stress):
+    result, _, _ = stress(STILL, "--only", "st*")
+    assert result.exit_code == 0
+    result = CliRunner().invoke(main, ["stress", "--only", "stil"])
+    assert result.exit_code == 2
+    assert 'there is no case "stil"' in result.stderr
+    assert "still" in result.stderr.removeprefix('sph: there is no case "stil"')
+
+
+@pytest.mark.parametrize(
+    ("bound", "inside", "outside"),
+    [
+        (Bound(at_most=1.0, why="-"), 1.0, 1.1),
+        (Bound(at_least=-1.0, why="-"), -1.0, -1.1),
+        (Bound(at_least=2.0, at_most=3.0, why="-"), 2.5, 1.9),
+    ],
+)
+def test_bounds(bound, inside, outside):
+    assert bound.holds(inside)
+    assert bound.closeness(inside) <= 1.0
+    for value in (outside, float("nan")):
+        assert not bound.holds(value)
+        assert bound.closeness(value) >= 1.0
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ("at_most = 2.0, ", "", "expected at_most, at_least or both"),
+        ("[settings.right]", "[[settings]]", "settings"),
+        ("title = ", "tilte = ", "tilte"),
+        ("history.max_density.max", "history.max_density.max", None),
+    ],
+)
+def test_a_broken_case_is_refused(old, new, said, tmp_path):
+    path = tmp_path / "case.toml"
+    path.write_text(STILL.replace(old, new))
+    if said is None:
+        assert cases.read(path).name == "case"
+        return
+    with pytest.raises(FileError, match=said):
+        cases.read(path)
+
+
+def test_a_case_that_nothing_is_to_pass_is_refused(tmp_path):
+    path = tmp_path / "case.toml"
+    path.write_text(STILL + 'fails = { limit = "conservation.energy_drift_max", because = "so" }\n')
+    with pytest.raises(FileError, match="no setting is expected to pass"):
+        cases.read(path)
+    path.write_text(STILL + 'fails = { limit = "report.none", because = "so" }\n')
+    with pytest.raises(FileError, match="which has no limit"):
+        cases.read(path)
+
+
+@pytest.mark.parametrize("name", cases.names())
+def test_shipped_cases_can_be_run(name, tmp_path):
+    (case,) = cases.load([name])
+    base = tmp_path / "base.toml"
+    base.write_text(case.to_toml())
+    for setting in case.settings:
+        configuration.load(base, case.settings[setting].set)
+        for figure in (*case.bounds(setting), *case.reaches):
+            assert figure.partition(".")[0] in figures.KINDS, figure
+
+
+def test_cases_are_in_the_package():
+    project = tomllib.loads((Path(sph.__file__).parents[1] / "pyproject.toml").read_text())
+    patterns = project["tool"]["setuptools"]["package-data"]["sph.stress"]
+    package = Path(sph.__file__).parent / "stress"
+    assert {path.stem for one in patterns for path in package.glob(one)} == set(cases.names())
+    assert cases.names()
+
+
+def test_an_unknown_case_is_an_error():
+    with pytest.raises(ConfigError, match="there is no case"):
+        cases.load(["no_such_case"])
