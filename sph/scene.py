@@ -41,6 +41,11 @@ class Scene:
         return self.viscosity.evolves
 
     @property
+    def finds_shocks(self) -> bool:
+        """Whether alpha follows from gradients of velocity and acceleration."""
+        return getattr(self.viscosity, "finds_shocks", False)
+
+    @property
     def conducts(self) -> bool:
         return self.config.physics.conductivity is not None
 
@@ -115,6 +120,7 @@ class Scene:
                 outside.append(f"{what}: {why_not}")
 
         part(self.evolves_alpha, "equation for alpha", "alpha is one number")
+        part(self.finds_shocks, "gradients of velocity", "no switch asks for them")
         part(self.sums_pressure, "sum of the pressure", f"{physics.scheme} takes it from density")
         part(self.conducts, "artificial conductivity", "physics.conductivity is not given")
         part(self.external is not None, "external field", "physics.external is not given")

@@ -9,7 +9,7 @@ from sph.integrators import leapfrog, step_size
 from sph.neighbours.order import BLOCK, number_of_blocks
 from sph.neighbours.search import Origin, Search, first_guess
 from sph.particles import Particles
-from sph.passes import density, rates
+from sph.passes import density, rates, shocks
 from sph.scene import Scene
 from sph.threads import Team
 from sph.watchdog import Watchdog, fault
@@ -55,11 +55,15 @@ class Simulation:
         self._bounds = step_size.Bounds(
             physics.C, physics.energy_limit, scene.external is not None, scene.config.time.end
         )
+        if not scene.evolves_alpha or scene.finds_shocks:
+            particles.alpha_rate = None
+        elif particles.alpha_rate is None:  # a restart that has changed the switch
+            particles.alpha_rate = np.zeros(n)
         self._dim = (0,) * scene.dimension
         self._support = np.zeros(n)
         self._velocity = np.empty_like(particles.velocity)  # full-step predictions (eqs 4-6)
         self._energy = np.empty(n)
-        self._alpha = np.empty(n) if scene.evolves_alpha else None
+        self._alpha = None if particles.alpha_rate is None else np.empty(n)
         self._pressure_term = np.empty(n)
         self._energy_shift = np.empty(n) if scene.sums_pressure else None
         self._sound_speed = np.empty(n)
@@ -117,12 +121,14 @@ class Simulation:
             )
             if self.scene.heating is not None:
                 self._energy = self.scene.heating.heated(self._energy, dt / 2)
-            if p.alpha is not None:
+            if p.alpha_rate is not None:
                 leapfrog.predict_scalar(dt, p.alpha, p.alpha_rate, self._alpha)
             stale = self.search.stale(p.position, p.support)
         if stale:
             self._build_lists(dt)
         self._density(self.scene.models)
+        if self.scene.finds_shocks:
+            self._find_shocks(dt)
         self._rates(self.scene.models)
         with self.clock.phase("predict, correct"):
             leapfrog.correct(dt, p.velocity, p.acceleration)
@@ -130,7 +136,7 @@ class Simulation:
                 dt, p.internal_energy, p.energy_rate, p.mass
             )
             self._heat(dt / 2)
-            if p.alpha is not None:
+            if p.alpha_rate is not None:
                 leapfrog.correct(dt, p.alpha, p.alpha_rate)
         self.step += 1
         self.steps_here += 1
@@ -147,7 +153,7 @@ class Simulation:
         p = self.particles
         self._velocity[:] = p.velocity
         self._energy[:] = p.internal_energy
-        if p.alpha is not None:
+        if p.alpha_rate is not None:
             self._alpha[:] = p.alpha
 
     def _build_lists(self, dt: float, guess: bool = False) -> None:
@@ -155,14 +161,15 @@ class Simulation:
         p = self.particles
         self.list_builds += 1
         with self.clock.phase("order"):
-            self.scene.domain.bring_inside(p.position, (p.velocity, self._velocity))
+            self._bring_inside()
             order = self.search.order(p.position, p.id)
+            kept = ("acceleration",) if self.scene.finds_shocks else ()
             for name, array in p.arrays().items():
-                if name not in NEW_EACH_STEP:
+                if name in kept or name not in NEW_EACH_STEP:
                     setattr(p, name, np.ascontiguousarray(array[..., order]))
             self._velocity = np.ascontiguousarray(self._velocity[:, order])
             self._energy = self._energy[order]
-            if p.alpha is not None:
+            if p.alpha_rate is not None:
                 self._alpha = self._alpha[order]
         with self.clock.phase("lists"):
             if guess:
@@ -170,6 +177,13 @@ class Simulation:
                 p.support = first_guess(p.position, models.support_ratio * models.eta)
             skin = self.search.skin_for(self._velocity, p.support, dt)
             self.search.build(Origin(p.position.copy(), p.support.copy(), skin), p.id)
+
+    def _bring_inside(self) -> None:
+        p = self.particles
+        vectors = (p.velocity, self._velocity)
+        if self.scene.finds_shocks:  # the last step's, whose gradient this step needs
+            vectors += (p.acceleration,)
+        self.scene.domain.bring_inside(p.position, vectors)
 
     def _neighbours(self) -> passes.Neighbours:
         search = self.search
@@ -206,7 +220,7 @@ class Simulation:
                 p.support, self._support = self._support, p.support
                 return
             with self.clock.phase("lists"):
-                self.scene.domain.bring_inside(p.position, (p.velocity, self._velocity))
+                self._bring_inside()
                 self.search.widen(p.position, self._wanted, p.id)
         block = int(np.argmax(self._wanted))
         among = p.id[block * BLOCK : (block + 1) * BLOCK].tolist()
@@ -217,13 +231,23 @@ class Simulation:
             among[0],
         )
 
+    def _find_shocks(self, dt: float) -> None:
+        """Alpha at the end of the step dt, from gradients of velocity and acceleration."""
+        p = self.particles
+        with self.clock.phase("viscosity"):
+            self.team.run(
+                shocks.shocks, self._wanted.size, self._dim, self.scene.models, self._neighbours(),
+                self._gas(), p.alpha, self._fields(p.support), self._div_v, p.acceleration, dt,
+            )  # fmt: skip
+
     def _rates(self, models) -> None:
         """Step 5: acceleration, rate of energy, and each particle's signal speed."""
         p = self.particles
         with self.clock.phase("rates"):
             self.team.run(
                 rates.rates, self._wanted.size, self._dim, models, self._neighbours(),
-                self._gas(), self._alpha, self._fields(p.support), self._summed(),
+                self._gas(), p.alpha if self.scene.finds_shocks else self._alpha,
+                self._fields(p.support), self._summed(),
                 self._balsara, self._energy if self.scene.conducts else None, p.acceleration,
                 p.energy_rate, self._signal_speed,
             )  # fmt: skip

@@ -24,12 +24,37 @@ class AlphaRange(Section):
 
     min: AtLeastZero = Field(description="where it decays to")
     max: AtLeastZero = Field(description="where strong compression drives it")
+    switch: Annotated[str, Choice("sph.viscosity.switches")] = Field(
+        "morris_monaghan", description="what compression drives it by"
+    )
+    ell: float | None = Field(
+        None, gt=0, description="speed of its decay by cullen_dehnen, there 0.05 if not given"
+    )
+
+    @model_validator(mode="before")
+    @classmethod
+    def _parameters_of_the_switch(cls, data: Any) -> Any:
+        name = data.get("switch") if isinstance(data, dict) else None
+        if name not in registry.names("sph.viscosity.switches"):
+            return data
+        return registry.model_class("sph.viscosity.switches", name)._field_defaults | data
 
     @model_validator(mode="after")
     def _in_order(self):
         if self.min > self.max:
             raise as_error([Issue(("min",), f"= {self.min}: expected at most max = {self.max}")])
+        if foreign := self.model_fields_set - {"switch", *self._model()._fields}:
+            issues = (Issue((key,), f'is no parameter of "{self.switch}"') for key in foreign)
+            raise as_error(issues)
         return self
+
+    def _model(self) -> type:
+        return registry.model_class("sph.viscosity.switches", self.switch)
+
+    def viscosity(self):
+        """The switch with its parameters, a NamedTuple of `sph.viscosity.switches`."""
+        model = self._model()
+        return model(**{key: getattr(self, key) for key in model._fields})
 
 
 class Physics(Section):
@@ -131,10 +156,10 @@ class Physics(Section):
 
     def viscosity_model(self):
         """The artificial viscosity, a NamedTuple of `sph.viscosity`."""
-        from sph.viscosity import constant, switched
+        from sph.viscosity import constant
 
         if isinstance(self.alpha, AlphaRange):
-            return switched.SwitchedAlpha(self.alpha.min, self.alpha.max)
+            return self.alpha.viscosity()
         return constant.ConstantAlpha(self.alpha)
 
 

@@ -89,7 +89,8 @@ class Scene:
     gamma: float = 1.4
     eta: float = 1.6
     C: float = 0.15
-    alpha: float | dict[str, float] = 1.0  # or {"min": …, "max": …}
+    # or {"min": …, "max": …}, where there is "ell" too the switch of Cullen & Dehnen (2010)
+    alpha: float | dict[str, float] = 1.0
     scheme: str = "grad_h"  # or "variational" or "pressure_energy"
     conductivity: tuple[str, float] | None = None  # ("pressure_jump" or "approach", strength)
     kernel: str = "wendland_c2"
@@ -101,6 +102,10 @@ class Scene:
     @property
     def dimension(self):
         return len(self.box)
+
+    @property
+    def finds_shocks(self):
+        return isinstance(self.alpha, dict) and "ell" in self.alpha
 
     @property
     def h_ratio(self):
@@ -162,6 +167,7 @@ class Rates:
     pressure: np.ndarray
     sound_speed: np.ndarray
     balsara: np.ndarray
+    alpha: np.ndarray  # that the pairs were given
     acceleration: np.ndarray
     energy_rate: np.ndarray
     alpha_rate: np.ndarray
@@ -174,6 +180,7 @@ class Rates:
     pressure_scale: np.ndarray
     sound_speed_scale: np.ndarray
     balsara_scale: np.ndarray
+    alpha_scale: np.ndarray  # 1, or the condition of the system its gradients come from
     acceleration_scale: np.ndarray  # (N,)
     energy_rate_scale: np.ndarray
     alpha_rate_scale: np.ndarray
@@ -444,9 +451,65 @@ def _forces(scene, pairs, mass, velocity, energy, alpha, state):
     }
 
 
+def _moments(scene, pairs, mass, support):
+    """(P,) weights of the gradient, (N, D, D) moments of r_ij with them, (N,) where they are flat.
+
+    Moments are flat, and stand here as unity, where neighbours lie on a line or in a plane.
+    """
+    with np.errstate(divide="ignore", invalid="ignore"):
+        slope = scene.kernel_at(pairs.r, support[pairs.i])[1] / pairs.r
+    weight = mass[pairs.j] * np.where(pairs.r > 0, -slope, 0.0)
+    moments = _products(pairs, weight, pairs.r * pairs.unit, len(mass))
+    flat = np.linalg.eigvalsh(moments)[:, 0] <= 1e-6 * np.trace(moments, axis1=1, axis2=2)
+    moments[flat] = np.eye(scene.dimension)
+    return weight, moments, flat
+
+
+def _products(pairs, weight, vectors, count):
+    """(N, D, D) sums of weight r_ij,b vector_a, b first."""
+    r_ij = pairs.r * pairs.unit
+    return np.array([[pairs.sum(weight * a * b, count) for b in r_ij] for a in vectors]).T
+
+
+def _gradient(scene, pairs, mass, support, field):
+    """(N, D, D) d field_a/dx_b of a (D, N) field, exact if linear: Cullen & Dehnen's appendix B."""
+    weight, moments, flat = _moments(scene, pairs, mass, support)
+    solved = np.linalg.solve(moments, _products(pairs, weight, pairs.difference(field), len(mass)))
+    solved[flat] = 0.0  # no gradient is to be had there
+    return solved.transpose(0, 2, 1)
+
+
+def shock_alpha(scene, pairs, mass, velocity, acceleration, alpha, dt, state):
+    """(N,) alpha after dt by Cullen & Dehnen (2010), their eqs 13-18; h there is H here."""
+    n, i, j, H = len(mass), pairs.i, pairs.j, state["support"]
+    within = pairs.r < H[i]
+    closing = np.minimum((pairs.difference(velocity) * pairs.unit).sum(axis=0), 0.0)
+    sound = state["sound_speed"]
+    v_sig = sound.copy()
+    np.maximum.at(v_sig, i[within], (0.5 * (sound[i] + sound[j]) - closing)[within])  # eq 15
+    L = _gradient(scene, pairs, mass, H, velocity)
+    divergence = np.trace(L, axis1=1, axis2=2)
+    rate = np.trace(_gradient(scene, pairs, mass, H, acceleration), axis1=1, axis2=2)
+    rate = rate - np.einsum("nab,nba->n", L, L)
+    S = 0.5 * (L + L.transpose(0, 2, 1))
+    S = S - divergence[:, None, None] / scene.dimension * np.eye(scene.dimension)
+    w = scene.kernel_at(pairs.r, H[i])[0]
+    R = pairs.sum(np.sign(state["divergence"][j]) * mass[j] * w, n) / state["density"]  # eq 17
+    converging = abs(2 * (1 - R) ** 4 * divergence) ** 2
+    shear = np.einsum("nab,nab->n", S, S)
+    flowing = converging + shear > 0
+    xi = converging / np.where(flowing, converging + shear, 1.0)  # eq 18
+    shock = H**2 * xi * np.maximum(-rate, 0.0)  # eq 13
+    target = scene.alpha["max"] * shock / (v_sig**2 + shock)  # eq 14
+    target = np.maximum(target, scene.alpha["min"])  # theirs is zero
+    tau = H / (2 * scene.alpha["ell"] * v_sig)
+    decayed = target + (alpha - target) * np.exp(-dt / tau)
+    return np.where(alpha < target, target, decayed)  # eq 16
+
+
 def _alpha_change(scene, alpha, state):
-    """Rate of change of alpha, eqs 27 and 28; zero where alpha is one number."""
-    if not isinstance(scene.alpha, dict):
+    """Rate of change of alpha, eqs 27 and 28; zero where alpha is one number or set by shocks."""
+    if not isinstance(scene.alpha, dict) or scene.finds_shocks:
         return {"alpha_rate": np.zeros_like(alpha), "alpha_rate_scale": np.zeros_like(alpha)}
     h = state["support"] / scene.h_ratio
     decay = (alpha - scene.alpha["min"]) / (h / (0.25 * state["sound_speed"]))
@@ -463,11 +526,21 @@ def _start_alpha(scene, count):
     return np.full(count, float(value))
 
 
-def rates(scene, position, velocity, mass, internal_energy, support_guess, alpha=None) -> Rates:
+class Before(NamedTuple):
+    """What the step before left to a switch that finds shocks."""
+
+    acceleration: np.ndarray  # (D, N)
+    dt: float  # the time since
+
+
+def rates(
+    scene, position, velocity, mass, internal_energy, support_guess, alpha=None, before=None
+) -> Rates:
     """Steps 2-6 from position and the predicted velocity, (D, N), energy and alpha, (N,).
 
     `support_guess` (N,) is the H the first density pass starts from; `alpha` defaults to that of
-    t = 0. ValueError where the energy is negative, H outgrows the box or eq 15 has no solution.
+    t = 0; `before` is None at the start, where no shock is looked for.
+    ValueError where the energy is negative, H outgrows the box or eq 15 has no solution.
     """
     if np.any(internal_energy < 0):
         raise ValueError("negative internal energy")
@@ -477,6 +550,12 @@ def rates(scene, position, velocity, mass, internal_energy, support_guess, alpha
     pairs = _pairs(scene, position, state["support"], state["support"])
     state |= _flow(scene, pairs, mass, velocity, state)
     state |= _thermodynamics(scene, pairs, mass, internal_energy, state)
+    if scene.finds_shocks and before is not None:
+        alpha = shock_alpha(
+            scene, pairs, mass, velocity, before.acceleration, alpha, before.dt, state
+        )
+        state["alpha_scale"] = np.linalg.cond(_moments(scene, pairs, mass, state["support"])[1])
+    state = {"alpha_scale": np.ones_like(alpha)} | state | {"alpha": alpha}
     state |= _forces(scene, pairs, mass, velocity, internal_energy, alpha, state)
     state |= _alpha_change(scene, alpha, state)
     return Rates(**state)
@@ -558,20 +637,23 @@ def _into_box(scene, position, *velocities):
 def _step(scene, state, dt) -> State:
     """Steps 1-8 over dt; the time is set by the caller, the history is carried on."""
     last, a, v, u = state.rates, state.rates.acceleration, state.velocity, state.internal_energy
-    position, v_half, v_tilde = _into_box(
+    position, v_half, v_tilde, a = _into_box(
         scene,
         state.position + v * dt + 0.5 * a * dt**2,  # eq 1
         v + 0.5 * a * dt,  # eq 2
         v + a * dt,  # eq 4
+        a,
     )
     u_half = u + 0.5 * last.energy_rate * dt  # eq 3
     u_tilde = u + last.energy_rate * dt  # eq 5
     alpha_half = state.alpha + 0.5 * last.alpha_rate * dt  # used in eq 31, defined nowhere
     alpha_tilde = state.alpha + last.alpha_rate * dt  # eq 6
-    now = rates(scene, position, v_tilde, state.mass, u_tilde, last.support, alpha_tilde)
+    before = Before(a, dt)
+    now = rates(scene, position, v_tilde, state.mass, u_tilde, last.support, alpha_tilde, before)
     velocity = v_half + 0.5 * now.acceleration * dt  # eq 29
     energy = u_half + 0.5 * now.energy_rate * dt  # eq 30
-    alpha = alpha_half + 0.5 * now.alpha_rate * dt  # eq 31
+    # eq 31, or what was found on the way
+    alpha = now.alpha if scene.finds_shocks else alpha_half + 0.5 * now.alpha_rate * dt
     return replace(
         state,
         position=position,

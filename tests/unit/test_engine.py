@@ -17,12 +17,13 @@ from sph.domain import Domain
 from sph.eos import ideal_gas
 from sph.neighbours import order as ordering
 from sph.neighbours.search import Origin, Search
-from sph.passes import density, rates
+from sph.passes import density, rates, shocks
 from sph.passes.smoothing import Converged, FixedPasses
 from sph.problems import base
 from sph.scene import Scene
 from sph.threads import Team
-from sph.viscosity import balsara, constant, switched
+from sph.viscosity import balsara, constant
+from sph.viscosity.switches import cullen_dehnen, morris_monaghan
 
 # Of the sum of absolute pair terms. With a count of passes both sides do the same sums in another
 # order: 6e-15 is seen. A converged H is off by TIGHT where the engine stops its iteration (the
@@ -31,6 +32,8 @@ from sph.viscosity import balsara, constant, switched
 ROUND_OFF = 1e-11
 TIGHT = 1e-13
 SWITCHED = {"min": 0.2, "max": 2.0}
+SHOCKS = {"min": 0.2, "max": 2.0, "ell": 0.3}
+STEP = 0.02  # the time over which alpha decays, some crossings of a support
 
 
 class EagerTeam(Team):
@@ -57,7 +60,8 @@ class Case:
         parts = [f"{len(self.boundaries)}d", *self.boundaries, self.kernel, str(self.passes)]
         parts += [self.scheme] * (self.scheme != "grad_h")
         parts += [self.conductivity[0]] if self.conductivity else []
-        parts += ["switched"] * self.evolves + ["balsara"] * self.balsara
+        parts += ["switched"] * self.evolves + ["shocks"] * self.finds_shocks
+        parts += ["balsara"] * self.balsara
         return "-".join(parts + ["flattened"] * self.flattened)
 
     @property
@@ -66,7 +70,12 @@ class Case:
 
     @property
     def evolves(self):
+        """Whether alpha has a rate of change."""
         return self.alpha is SWITCHED
+
+    @property
+    def finds_shocks(self):
+        return self.alpha is SHOCKS
 
     @property
     def eta(self):
@@ -99,6 +108,14 @@ class Case:
         return registry.model_class("sph.conductivity", name)(strength)
 
     @property
+    def viscosity(self):
+        if self.finds_shocks:
+            return cullen_dehnen.CullenDehnen(**SHOCKS)
+        if self.evolves:
+            return morris_monaghan.MorrisMonaghan(**SWITCHED)
+        return constant.ConstantAlpha(self.alpha)
+
+    @property
     def models(self):
         parameters = {"flattened": self.flattened} if self.kernel == "cubic_spline" else {}
         kernel = kernels.make(self.kernel, **parameters)
@@ -107,9 +124,7 @@ class Case:
             kernel=kernel,
             smoothing=Converged(TIGHT) if self.passes == "converged" else FixedPasses(self.passes),
             eos=ideal_gas.IdealGas(1.4),
-            viscosity=switched.SwitchedAlpha(**SWITCHED)
-            if self.evolves
-            else constant.ConstantAlpha(self.alpha),
+            viscosity=self.viscosity,
             conductivity=self.conductivity_model,
             balsara=balsara.Balsara() if self.balsara else None,
             support_ratio=kernels.support_ratio(kernel, self.dimension),
@@ -144,6 +159,9 @@ CASES = [
     Case((OPEN,), W, 2, scheme="pressure_energy"),
     Case((MIRROR, PERIODIC), W, "converged", SWITCHED, scheme="pressure_energy", conductivity=JUMP),
     Case((PERIODIC, OPEN, MIRROR), W, 2, scheme="pressure_energy", conductivity=APPROACH),
+    Case((MIRROR,), W, 2, alpha=SHOCKS, balsara=False),
+    Case((OPEN, MIRROR), W, "converged", alpha=SHOCKS, scheme="variational"),
+    Case((PERIODIC, MIRROR, OPEN), "wendland_c4", 2, alpha=SHOCKS, balsara=False),
 ]
 
 
@@ -156,6 +174,7 @@ class Particles:
     mass: np.ndarray
     energy: np.ndarray
     alpha: np.ndarray
+    acceleration: np.ndarray  # of the step before
     support: np.ndarray  # H to begin with
     earlier: np.ndarray  # positions the lists are built from
     listed: np.ndarray  # supports likewise
@@ -193,6 +212,8 @@ def random_gas(case, lists, seed=3):
     converged = replace(case.dense_scene, density_passes="converged")
     true = dense.rates(converged, position, velocity, mass, energy, np.full(count, 0.1)).support
     support = random.uniform(0.97, 1.03, count) * true
+    # of the order of velocity^2 / H, so that shocks are found in part
+    acceleration = random.normal(size=position.shape) / true
     earlier, listed, skin = position, support, 0.2
     if lists == "reused":
         # 0.1 H of motion and 3 % of H from two particles leave a reach of 1.1 H at least
@@ -202,17 +223,18 @@ def random_gas(case, lists, seed=3):
     if lists == "widened":
         support = listed = 0.9 * support
         skin = 0.01
-    return Particles(position, velocity, mass, energy, alpha, support, earlier, listed), skin
+    return Particles(
+        position, velocity, mass, energy, alpha, acceleration, support, earlier, listed
+    ), skin
 
 
-def pass_over(function, team, case, gas, search, *arrays):
+def pass_over(function, team, case, gas, search, alpha, *arrays):
     """Run a pass over all blocks with the arguments that both passes share."""
     neighbours = passes.Neighbours(
         search.lists, search.domain.images, search.origin.support, search.reach_factor
     )
     blocks = ordering.number_of_blocks(gas.mass.size)
     state = passes.Gas(gas.position, gas.velocity, gas.mass, gas.energy, gas.support)
-    alpha = gas.alpha if case.evolves else None
     dim = (0,) * case.dimension
     team.run(function, blocks, dim, case.models, neighbours, state, alpha, *arrays)
 
@@ -231,7 +253,9 @@ def run_engine(case, gas, skin, threads):
     summed = None
     if schemes.sums_pressure(case.models.scheme):
         summed = passes.SummedPressure(*np.full((2, count), np.nan))
-    div_v = np.full(count, np.nan) if case.balsara or case.evolves else None
+    alpha = gas.alpha if case.evolves else None
+    needed = case.balsara or case.evolves or case.finds_shocks
+    div_v = np.full(count, np.nan) if needed else None
     curl_v = np.full(count, np.nan) if case.balsara and case.dimension > 1 else None
     f = np.full(count, np.nan) if case.balsara else None
     alpha_rate = np.full(count, np.nan) if case.evolves else None
@@ -241,15 +265,20 @@ def run_engine(case, gas, skin, threads):
         if wanted.max() > 0:
             search.widen(gas.position, wanted, identity)
         pass_over(
-            density.density, team, case, gas, search, fields, summed, div_v, curl_v, f, alpha_rate,
-            wanted,
+            density.density, team, case, gas, search, alpha, fields, summed, div_v, curl_v, f,
+            alpha_rate, wanted,
         )  # fmt: skip
         widenings += 1
+    if case.finds_shocks:
+        alpha = gas.alpha.copy()
+        pass_over(
+            shocks.shocks, team, case, gas, search, alpha, fields, div_v, gas.acceleration, STEP
+        )
     acceleration = np.full(gas.position.shape, np.nan)
     energy_rate, signal_speed = np.full((2, count), np.nan)
     conducted = gas.energy if case.conductivity else None
     pass_over(
-        rates.rates, team, case, gas, search, fields, summed, f, conducted, acceleration,
+        rates.rates, team, case, gas, search, alpha, fields, summed, f, conducted, acceleration,
         energy_rate, signal_speed,
     )  # fmt: skip
     team.close()
@@ -261,6 +290,7 @@ def run_engine(case, gas, skin, threads):
         "divergence": div_v,
         "curl": curl_v,
         "balsara": f,
+        "alpha": alpha,
         "alpha_rate": alpha_rate,
         "acceleration": acceleration,
         "energy_rate": energy_rate,
@@ -281,15 +311,23 @@ def eager_order(monkeypatch):
 def test_every_rate_is_that_of_the_equations(case, lists):
     scattered, skin = random_gas(case, lists)
     gas, found, widenings = run_engine(case, scattered, skin, threads=1)
-    alpha = gas.alpha if case.evolves else None
-    expected = dense.rates(
-        case.dense_scene, gas.position, gas.velocity, gas.mass, gas.energy, gas.support, alpha
-    )
+    alpha = found["alpha"] if case.finds_shocks else gas.alpha if case.evolves else None
+    state = (case.dense_scene, gas.position, gas.velocity, gas.mass, gas.energy, gas.support)
+    expected = dense.rates(*state, alpha)
     # the gas is what it is meant to be: H varies tenfold, Omega does not blow round-off up
     assert expected.support.max() > 10 * expected.support.min()
     assert expected.omega.min() > 0.05
     # and the lists too: where they fall short, each of three passes asks for no more than one more
     assert widenings in ((1, 2, 3) if lists == "widened" else (0,))
+
+    if case.finds_shocks:
+        switched = dense.rates(*state, gas.alpha, dense.Before(gas.acceleration, STEP))
+        # some particles are in shocks of any strength and some are not
+        risen = switched.alpha > gas.alpha
+        assert 0.1 < risen.mean() < 0.9
+        assert np.ptp(switched.alpha[risen]) > 1.0
+        error = abs(alpha - switched.alpha)
+        assert np.all(error <= ROUND_OFF * switched.alpha_scale), np.max(error)
 
     for name, values in found.items():
         error = abs(values - getattr(expected, name))
@@ -343,7 +381,11 @@ def simulate(case, gas, end, threads=1):
         boundary=list(case.boundaries),
         given=gas,
     )
-    alpha = config.AlphaRange(**case.alpha) if case.evolves else case.alpha
+    alpha = case.alpha
+    if case.evolves:
+        alpha = config.AlphaRange(**alpha)
+    if case.finds_shocks:
+        alpha = config.AlphaRange(**alpha, switch="cullen_dehnen")
     name, strength = case.conductivity or (None, None)
     physics = config.Physics(
         gamma=1.4, alpha=alpha, eta=case.eta, density_passes=case.passes, scheme=case.scheme,
@@ -368,6 +410,7 @@ TRAJECTORIES = [
     (Case((MIRROR,), W, 2, alpha=1.5), (70,), 0.05),
     (Case((PERIODIC, MIRROR), W, 2, alpha=SWITCHED), (11, 11), 0.1),
     (Case((PERIODIC,), W, 2, scheme="pressure_energy", conductivity=JUMP), (70,), 0.05),
+    (Case((PERIODIC, MIRROR), W, 2, alpha=SHOCKS), (11, 11), 0.1),
 ]
 
 
@@ -386,7 +429,7 @@ def test_trajectories_are_those_of_the_equations(case, count, end, monkeypatch):
         (found.velocity, expected.velocity, speed),
         (found.internal_energy, expected.internal_energy, speed**2),
         (found.support, expected.rates.support, length),
-        (found.alpha, expected.alpha if case.evolves else None, 1.0),
+        (found.alpha, expected.alpha if case.evolves or case.finds_shocks else None, 1.0),
     ):
         if true is not None:
             np.testing.assert_allclose(values, true, rtol=1e-9, atol=1e-9 * scale)

@@ -6,7 +6,8 @@ from numba import njit
 
 from sph import eos, registry, viscosity
 from sph.compiled import COMPILED
-from sph.viscosity import balsara, constant, switched
+from sph.viscosity import balsara, constant
+from sph.viscosity.switches import cullen_dehnen, morris_monaghan
 
 FEW_ROUNDINGS = 1e-14  # of some operations at 1e-16 each
 DENSITY, ENERGY = np.array([0.125, 1.0, 4.0]), np.array([2.0, 0.5, 1e-12])
@@ -40,8 +41,8 @@ def test_constant_alpha_is_of_no_particle():
     assert model.start() == model.pair_alpha(0.0, 9.0) == 1.5
 
 
-def test_switched_alpha_rises_in_compression_and_decays():
-    model = switched.SwitchedAlpha(0.1, 2.1)
+def test_alpha_rises_in_compression_and_decays():
+    model = morris_monaghan.MorrisMonaghan(0.1, 2.1)
     assert model.evolves
     assert model.start() == 0.1
     assert model.pair_alpha(1.0, 2.0) == 1.5
@@ -49,6 +50,25 @@ def test_switched_alpha_rises_in_compression_and_decays():
     rate = model.alpha_rate(alpha, h, sound, np.array([-3.0, -3.0, 3.0, -3.0]))
     # by hand: source 3 (2.1 - alpha) where it converges, decay (alpha - 0.1) * 0.25 * 4 / 0.2
     np.testing.assert_allclose(rate, [6, 3 - 5, -5, -10], rtol=FEW_ROUNDINGS)
+
+
+def test_alpha_of_shocks_jumps_up_and_decays_exactly():
+    model = cullen_dehnen.CullenDehnen(0.1, 2.0, ell=0.05)
+    assert model.evolves
+    assert model.start() == 0.1
+    assert model.pair_alpha(1.0, 2.0) == 1.5
+    # by hand, with H = 0.5 and v_sig = 2: H^2 A = 4 for a limiter of 1/2 is half of max; the
+    # limiter is 1/2 where (2 (1 - R)^4 div)^2 = shear, here (2 (1/2)^4 4)^2 = 1/4
+    found = [
+        model.alpha_after(alpha, 3.0, 0.5, 2.0, 4.0, rate, shear, 0.5)
+        for alpha, rate, shear in [(0.3, -32.0, 0.25), (1.5, -32.0, 0.25), (1.5, 32.0, 0.25)]
+    ]
+    decay = np.exp(-3.0 * 2 * 0.05 * 2.0 / 0.5)  # dt / tau
+    np.testing.assert_allclose(
+        found, [1.0, 1.0 + 0.5 * decay, 0.1 + 1.4 * decay], rtol=FEW_ROUNDINGS
+    )
+    # at rest there is no shock
+    assert model.alpha_after(0.1, 1.0, 0.5, 2.0, 0.0, -1.0, 0.0, 0.0) == 0.1
 
 
 def test_balsara_tells_compression_from_shear():
@@ -76,12 +96,22 @@ def _compiled(gas, model, limiter, density, energy, alpha, divergence):
     )
 
 
+@njit(**COMPILED)
+def _compiled_shock(model, alpha, dt, support, signal_speed, divergence, rate, shear, signs):
+    return viscosity.alpha_after(
+        model, alpha, dt, support, signal_speed, divergence, rate, shear, signs
+    )
+
+
 def test_compiled_code_finds_the_same_numbers():
     gas, model, limiter = (
         eos.make("ideal_gas", gamma=1.4),
-        switched.SwitchedAlpha(0.1, 2.0),
+        morris_monaghan.MorrisMonaghan(0.1, 2.0),
         balsara.Balsara(),
     )
+    shocked = (0.4, 0.1, 0.5, 2.0, -1.0, -3.0, 0.7, -0.2)
+    switch = cullen_dehnen.CullenDehnen(0.1, 2.0)
+    assert _compiled_shock(switch, *shocked) == pytest.approx(switch.alpha_after(*shocked))
     for divergence in (-3.0, 3.0):
         P = gas.pressure(2.0, 0.3)
         c = gas.sound_speed(2.0, P)

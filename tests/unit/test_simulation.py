@@ -60,7 +60,8 @@ def fingerprint(simulation):
 # --- threads ----------------------------------------------------------------------------------
 
 
-def test_two_threads_give_the_bits_of_one(begin, monkeypatch):
+@pytest.mark.parametrize("switch", ["morris_monaghan", "cullen_dehnen"])
+def test_two_threads_give_the_bits_of_one(begin, monkeypatch, switch):
     shared = []
     run = Team.run
 
@@ -69,7 +70,9 @@ def test_two_threads_give_the_bits_of_one(begin, monkeypatch):
         run(team, function, items, *arguments, smallest=smallest)
 
     monkeypatch.setattr(Team, "run", counted)
-    one, two = (begin(SHEAR, threads=threads) for threads in (1, 2))
+    one, two = (
+        begin(SHEAR, f"physics.alpha.switch={switch}", threads=threads) for threads in (1, 2)
+    )
     assert any(shared)  # else this shows nothing
     assert fingerprint(one) == fingerprint(two)
     builds = one.list_builds

@@ -6,7 +6,8 @@ import pytest
 
 from sph import config, registry
 from sph.errors import ConfigError, FileError
-from sph.viscosity import constant, switched
+from sph.viscosity import constant
+from sph.viscosity.switches import cullen_dehnen, morris_monaghan
 
 KERNELS = ", ".join(f'"{name}"' for name in registry.names("sph.kernels"))
 MINIMAL = '[problem]\nname = "shock_tube"\n'
@@ -94,9 +95,12 @@ def test_models_of_tables():
         "physics.eos={name = 'ideal_gas', gamma = 3}",
     ).physics
     viscosity = physics.viscosity_model()
-    assert type(viscosity) is switched.SwitchedAlpha
+    assert type(viscosity) is morris_monaghan.MorrisMonaghan
     assert (type(viscosity.min), type(viscosity.max)) == (float, float)
     assert viscosity == (0.0, 2.0)
+    other = default("physics.alpha={min = 0, max = 2, switch = 'cullen_dehnen'}").physics
+    assert type(other.viscosity_model()) is cullen_dehnen.CullenDehnen
+    assert other.viscosity_model() == (0.0, 2.0, 0.05)
     assert physics.kernel_model().flattened is True
     assert physics.eos_model() == (3.0,)
     assert type(physics.eos_model().gamma) is float
@@ -112,6 +116,7 @@ def test_density_passes_are_a_count_or_a_word(value):
 CHANGES = [
     (),
     ("physics.alpha={min = 0.1, max = 2}", "physics.density_passes=converged"),
+    ("physics.alpha={min = 0.1, max = 2, switch = 'cullen_dehnen'}",),
     ("physics.kernel=cubic_spline", "run.threads=2", "time.end=1e-7"),
     ("physics.eos={name = 'ideal_gas', gamma = 1.1}", "problem.domain=[[-1, 1]]"),
 ]
@@ -161,7 +166,7 @@ def test_template_reads_back_as_the_default_and_explains_every_key(problem):
                 i for i, line in enumerate(lines) if line.startswith((f"{key} =", f"# {key} ="))
             ]
             assert lines[at - 1].startswith("# ")
-    assert "of at least 0 or a table { min, max }; default" in text
+    assert "of at least 0 or a table { min, max, switch, ell }; default" in words
 
 
 def test_template_of_no_problem_names_the_nearest():
@@ -233,7 +238,8 @@ WRONG = {
     ),
     "bool for number": (
         "[physics]\n\nalpha = true",
-        "line 5: physics.alpha = true: expected a number of at least 0 or a table { min, max }",
+        "line 5: physics.alpha = true: expected a number of at least 0 or a table "
+        "{ min, max, switch, ell }",
     ),
     "number for bool": (
         "[physics]\nbalsara = 1",
@@ -245,7 +251,8 @@ WRONG = {
     ),
     "negative": (
         "[physics]\nalpha = -0.1",
-        "line 4: physics.alpha = -0.1: expected a number of at least 0 or a table { min, max }",
+        "line 4: physics.alpha = -0.1: expected a number of at least 0 or a table "
+        "{ min, max, switch, ell }",
     ),
     "zero": ("[time]\nend = 0", "line 4: time.end = 0: expected a number greater than 0"),
     "count or word": (
@@ -280,6 +287,15 @@ WRONG = {
     "table header": (
         "[physics.alpha]\nmin = 2\nmax = 1",
         "line 4: physics.alpha.min = 2.0: expected at most max = 1.0",
+    ),
+    "wrong switch": (
+        '[physics.alpha]\nmin = 1\nmax = 2\nswitch = "cullen"',
+        'line 6: physics.alpha.switch = "cullen": expected one of "cullen_dehnen", '
+        '"morris_monaghan"; did you mean "cullen_dehnen"?',
+    ),
+    "parameter of another switch": (
+        "[physics.alpha]\nmin = 1\nmax = 2\nell = 0.1",
+        'line 6: physics.alpha.ell is no parameter of "morris_monaghan"',
     ),
     "inline table, missing": (
         "[physics]\nalpha = { min = 0 }",

@@ -1,4 +1,4 @@
-"""A coefficient per particle that rises in compression and decays behind it.
+"""Alpha rises with the compression of the flow and decays behind it.
 
 Seed eqs 6, 27, 28, 31 (Morris & Monaghan 1997; the source term as in Rosswog et al. 2000).
 """
@@ -8,7 +8,7 @@ from typing import NamedTuple
 from sph.compiled import larger
 
 
-class SwitchedAlpha(NamedTuple):
+class MorrisMonaghan(NamedTuple):
     """`min`: where alpha decays to; `max`: where strong compression drives it."""
 
     min: float

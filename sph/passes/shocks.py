@@ -1,0 +1,157 @@
+"""The pass over velocity gradients, for switches that tell shocks by them.
+
+Gradients are those of Cullen & Dehnen (2010, appendix B): with r = r_i - r_j and weights
+g_j = -m_j (dW/dr)/r, the matrix sum g v_ij r^T times the inverse of sum g r r^T is exact for
+every linear field. d(div v)/dt = div a - tr(L L), L the velocity gradient, takes the acceleration
+of the last step. (A difference of div v over a step would not do: a step cut short to land
+on an output divides what prediction and correction differ by, which does not shrink with it.)
+"""
+
+import numpy as np
+from numba import njit
+
+from sph.compiled import COMPILED
+from sph.kernels import dw_over_q, normalisation, w
+from sph.neighbours.lists import IMAGE_SHIFT
+from sph.neighbours.order import BLOCK
+from sph.viscosity import alpha_after
+
+# A pivot below this part of the trace means that neighbours lie on a line or in a plane: there is
+# no gradient, and it counts as zero.
+SINGULAR = 1e-6
+
+
+@njit(**COMPILED, forceinline=True)
+def _invert(matrix, inverse):
+    """Inverse of a symmetric positive (D, D) matrix by Gauss and Jordan; zero where it has none.
+
+    Positive matrices need no exchange of rows. `matrix` is used up.
+    """
+    D = matrix.shape[0]
+    trace = 0.0
+    for a in range(D):
+        trace += matrix[a, a]
+        for b in range(D):
+            inverse[a, b] = 1.0 if a == b else 0.0
+    for a in range(D):
+        if not matrix[a, a] > SINGULAR * trace:
+            inverse[:] = 0.0
+            return
+        scale = 1.0 / matrix[a, a]
+        for c in range(D):
+            matrix[a, c] *= scale
+            inverse[a, c] *= scale
+        for b in range(D):
+            factor = matrix[b, a]
+            if b != a:
+                for c in range(D):
+                    matrix[b, c] -= factor * matrix[a, c]
+                    inverse[b, c] -= factor * inverse[a, c]
+
+
+@njit(**COMPILED)
+def shocks(
+    first_block, last_block, dim, models, neighbours, gas, alpha, fields, div_v, acceleration, dt
+):
+    """Advance alpha (N,) by the step dt, in place, over blocks [first_block, last_block).
+
+    fields and div_v (N,) are of the density pass, acceleration (D, N) of the last step.
+    """
+    D = len(dim)
+    _, kernel, _, _, viscosity, _, _, _, _ = models
+    lists, images, _, _ = neighbours
+    start, count, candidates = lists
+    sign, offset = images
+    position, velocity, mass, _, _ = gas
+    support, density, _, _, sound_speed = fields
+    C = normalisation(kernel, dim)
+    size = 0
+    for block in range(first_block, last_block):
+        size = max(size, count[block])
+    x = np.empty((D, size))
+    v = np.empty((D, size))
+    a = np.empty((D, size))
+    m = np.empty(size)
+    c_s = np.empty(size)
+    signed = np.empty(size)
+    # the same of the neighbours of one particle, as differences
+    r_ij = np.empty((D, size))
+    v_ij = np.empty((D, size))
+    a_ij = np.empty((D, size))
+    weight = np.empty(size)
+    matrix = np.empty((D, D))
+    inverse = np.empty((D, D))
+    L = np.empty((D, D))
+    for block in range(first_block, last_block):
+        nc = count[block]
+        for k in range(nc):
+            packed = candidates[start[block] + k]
+            j = packed & ((1 << IMAGE_SHIFT) - 1)
+            image = packed >> IMAGE_SHIFT
+            for d in range(D):
+                x[d, k] = sign[image, d] * position[d, j] + offset[image, d]
+                v[d, k] = sign[image, d] * velocity[d, j]
+                a[d, k] = sign[image, d] * acceleration[d, j]
+            m[k] = mass[j]
+            c_s[k] = sound_speed[j]
+            signed[k] = mass[j] * np.sign(div_v[j])
+        for i in range(block * BLOCK, min((block + 1) * BLOCK, mass.size)):
+            H_inv = 1.0 / support[i]
+            n = 0
+            signs = 0.0
+            fastest = sound_speed[i]
+            for k in range(nc):
+                squared = 0.0
+                for d in range(D):
+                    squared += (position[d, i] - x[d, k]) ** 2
+                q = np.sqrt(squared) * H_inv
+                if q >= 1.0:
+                    continue
+                v_dot_r = 0.0
+                for d in range(D):
+                    r_ij[d, n] = (position[d, i] - x[d, k]) * H_inv
+                    v_ij[d, n] = velocity[d, i] - v[d, k]
+                    a_ij[d, n] = acceleration[d, i] - a[d, k]
+                    v_dot_r += v_ij[d, n] * r_ij[d, n]
+                weight[n] = -m[k] * dw_over_q(kernel, dim, q)
+                signs += signed[k] * w(kernel, dim, q)
+                closing = min(v_dot_r, 0.0) / q if q > 0.0 else 0.0
+                fastest = max(fastest, 0.5 * (sound_speed[i] + c_s[k]) - closing)  # eq 15
+                n += 1
+            signs *= C * H_inv**D / density[i]  # eq 17
+            for s in range(D):
+                for t in range(D):
+                    total = 0.0
+                    for k in range(n):
+                        total += weight[k] * r_ij[s, k] * r_ij[t, k]
+                    matrix[s, t] = total
+            _invert(matrix, inverse)
+            divergence_rate = 0.0
+            for s in range(D):
+                for t in range(D):
+                    total = total_a = 0.0
+                    for k in range(n):
+                        total += weight[k] * v_ij[s, k] * r_ij[t, k]
+                        total_a += weight[k] * a_ij[s, k] * r_ij[t, k]
+                    matrix[s, t] = total
+                    divergence_rate += total_a * inverse[t, s] * H_inv
+            divergence = 0.0
+            for s in range(D):
+                for t in range(D):
+                    total = 0.0
+                    for k in range(D):
+                        total += matrix[s, k] * inverse[k, t]
+                    L[s, t] = total * H_inv
+                divergence += L[s, s]
+            shear = 0.0
+            for s in range(D):
+                for t in range(D):
+                    divergence_rate -= L[s, t] * L[t, s]
+                    strain = 0.5 * (L[s, t] + L[t, s])
+                    if s == t:
+                        strain -= divergence / D
+                    shear += strain * strain
+            alpha[i] = alpha_after(
+                viscosity, alpha[i], dt, support[i], fastest, divergence, divergence_rate, shear,
+                signs,
+            )  # fmt: skip

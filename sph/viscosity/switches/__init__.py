@@ -1,0 +1,1 @@
+"""Switches: how each particle's viscosity coefficient rises in shocks and decays. One file each."""
