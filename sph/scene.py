@@ -75,7 +75,9 @@ class Scene:
     def models(self) -> Models:
         """The models of the density and rate passes."""
         passes = self.config.physics.density_passes
-        return self._models(Converged(TOLERANCE) if passes == "converged" else FixedPasses(passes))
+        if passes == "converged":
+            return self.starting_models
+        return self._models(FixedPasses(passes, TOLERANCE))
 
     @cached_property
     def starting_models(self) -> Models:

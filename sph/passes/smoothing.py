@@ -7,8 +7,16 @@ radius within which the candidates are complete, the radius to list them to befo
 
 from typing import NamedTuple
 
-from sph.compiled import verb
+from numba import njit
+
+from sph.compiled import INLINED, verb
 from sph.kernels import dw_over_q, normalisation, w
+
+# The passes of eqs 7 and 15 approach their common root by a factor 1 - Omega each: where a flow is
+# resolved they end within a percent of it. Where Omega exceeds 2, at a jump of mass or density
+# between neighbours, they lead away from it for good. From this change of H on, relative, in the
+# last pass a particle's support is solved for instead.
+UNSETTLED = 0.05
 
 # In logarithms the sum of masses is nearly straight: Newton needs 3 or 4 iterations from a guess
 # within a factor 2, and bisection from there to 1e-10 at most 40 more.
@@ -21,9 +29,10 @@ def find_support(self, kernel, dim, r, m, nc, mass, H, ratio, reach):
 
 
 class FixedPasses(NamedTuple):
-    """Evaluate eqs 7, 8 and 15 `count` times."""
+    """Evaluate eqs 7, 8 and 15 `count` times, or solve them where that does not settle."""
 
     count: int
+    tolerance: float  # of the solution, relative
 
     def find_support(self, kernel, dim, r, m, nc, mass, H, ratio, reach):
         C = normalisation(kernel, dim)
@@ -47,41 +56,49 @@ class FixedPasses(NamedTuple):
                 Omega = -sum_dw / (D * sum_w)  # eq 8 with eqs 7 and 10: the D w terms cancel the 1
             rho = C * H_inv**D * sum_w  # eq 7
             H = ratio * (mass / rho) ** (1.0 / D)  # eq 15
+        if abs(H * H_inv - 1.0) > UNSETTLED:
+            return solve(kernel, dim, r, m, nc, mass, 1.0 / H_inv, ratio, reach, self.tolerance)
         return H, rho, Omega, (0.0 if reach >= H else H)
 
 
 class Converged(NamedTuple):
-    """Solve eqs 7 and 15 together to the relative `tolerance`: Newton, safeguarded by bisection."""
+    """Solve eqs 7 and 15 together to the relative `tolerance`."""
 
     tolerance: float
 
     def find_support(self, kernel, dim, r, m, nc, mass, H, ratio, reach):
-        C = normalisation(kernel, dim)
-        D = len(dim)
-        target = mass * ratio**D / C  # sum m w at the root of eqs 7 and 15
-        lower, upper = 0.0, 0.0  # bracket; upper = 0: none known yet
-        for _ in range(MAX_ITERATIONS):
-            if not reach >= H:
-                return H, 0.0, 0.0, H
-            H_inv = 1.0 / H
-            sum_w = 0.0
-            sum_dw = 0.0
-            for k in range(nc):
-                q = r[k] * H_inv
-                sum_w += m[k] * w(kernel, dim, q)
-                sum_dw += m[k] * (q * q) * dw_over_q(kernel, dim, q)
-            if sum_w < target:  # sum m w(r/H) rises with H
-                lower = H
-            else:
-                upper = H
-            # d ln(sum m w)/d ln H = -sum_dw/sum_w; it vanishes without neighbours, where the step
-            # goes to its bound, upwards a small one: a support too wide has many neighbours
-            slope = max(-sum_dw / sum_w, 0.1)
-            H_next = H * min(max((target / sum_w) ** (1.0 / slope), 0.5), 1.25)
-            if upper > 0.0 and not lower < H_next < upper:
-                H_next = 0.5 * (lower + upper)
-            if abs(H_next - H) <= self.tolerance * H:
-                rho = C * H_inv**D * sum_w
-                return H, rho, -sum_dw / (D * sum_w), 0.0
-            H = H_next
-        return H, -1.0, 0.0, 0.0  # a density below zero: the caller names the particle
+        return solve(kernel, dim, r, m, nc, mass, H, ratio, reach, self.tolerance)
+
+
+@njit(**INLINED)
+def solve(kernel, dim, r, m, nc, mass, H, ratio, reach, tolerance):
+    """The root of eqs 7 and 15: Newton's iteration, safeguarded by bisection."""
+    C = normalisation(kernel, dim)
+    D = len(dim)
+    target = mass * ratio**D / C  # sum m w at the root of eqs 7 and 15
+    lower, upper = 0.0, 0.0  # bracket; upper = 0: none known yet
+    for _ in range(MAX_ITERATIONS):
+        if not reach >= H:
+            return H, 0.0, 0.0, H
+        H_inv = 1.0 / H
+        sum_w = 0.0
+        sum_dw = 0.0
+        for k in range(nc):
+            q = r[k] * H_inv
+            sum_w += m[k] * w(kernel, dim, q)
+            sum_dw += m[k] * (q * q) * dw_over_q(kernel, dim, q)
+        if sum_w < target:  # sum m w(r/H) rises with H
+            lower = H
+        else:
+            upper = H
+        # d ln(sum m w)/d ln H = -sum_dw/sum_w; it vanishes without neighbours, where the step
+        # goes to its bound, upwards a small one: a support too wide has many neighbours
+        slope = max(-sum_dw / sum_w, 0.1)
+        H_next = H * min(max((target / sum_w) ** (1.0 / slope), 0.5), 1.25)
+        if upper > 0.0 and not lower < H_next < upper:
+            H_next = 0.5 * (lower + upper)
+        if abs(H_next - H) <= tolerance * H:
+            rho = C * H_inv**D * sum_w
+            return H, rho, -sum_dw / (D * sum_w), 0.0
+        H = H_next
+    return H, -1.0, 0.0, 0.0  # a density below zero: the caller names the particle

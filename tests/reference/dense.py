@@ -287,8 +287,19 @@ def _smoothing(scene, position, mass, guess):
     else:
         support = guess
         for _ in range(scene.density_passes):
-            rho, omega, omega_scale = _density(scene, position, mass, support)
+            before = support
+            rho, omega, omega_scale = _density(scene, position, mass, before)
             support = scene.h_ratio * scene.eta * (mass / rho) ** (1 / scene.dimension)  # eq 15
+        # no scheme of the paper's: where the last pass still moves H by 5 %, eq 15 is solved
+        unsettled = abs(support / before - 1) > 0.05
+        if unsettled.any():
+            solved = _converged_support(scene, position, mass, guess)
+            at_root = _density(scene, position, mass, solved)
+            support = np.where(unsettled, solved, support)
+            rho, omega, omega_scale = (
+                np.where(unsettled, *pair)
+                for pair in zip(at_root, (rho, omega, omega_scale), strict=True)
+            )
     return {
         "support": support,
         "density": rho,

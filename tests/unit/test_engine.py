@@ -122,7 +122,9 @@ class Case:
         return passes.Models(
             scheme=schemes.make(self.scheme),
             kernel=kernel,
-            smoothing=Converged(TIGHT) if self.passes == "converged" else FixedPasses(self.passes),
+            smoothing=Converged(TIGHT)
+            if self.passes == "converged"
+            else FixedPasses(self.passes, TIGHT),
             eos=ideal_gas.IdealGas(1.4),
             viscosity=self.viscosity,
             conductivity=self.conductivity_model,
