@@ -32,11 +32,13 @@ class Watchdog:
             for axis in open_axes
             for lo, hi in [box[axis]]
         ]
+        self._lowest_energy = getattr(scene.eos, "lowest_energy", None)
         self._marked = None  # (time, step) at which the present window began
         self._longest = 0.0  # time covered by the best window
 
     def check(self, simulation) -> None:
         """Raise NumericalError, which names a particle, where `simulation` cannot go on."""
+        self._check_gas(simulation)
         self._check_numbers(simulation)
         self._check_energy(simulation)
         self._check_fences(simulation)
@@ -73,6 +75,24 @@ class Watchdog:
             f"the time step came out as {dt}, set by {simulation.limit.criterion}",
             SMALLER_STEPS,
             simulation.limit.particle,
+        )
+
+    def _check_gas(self, simulation) -> None:
+        """Gas that is torn apart: where sound has no speed, neither forces nor steps have sense."""
+        if self._lowest_energy is None:
+            return
+        p = simulation.particles
+        above = p.internal_energy - self._lowest_energy(p.density)
+        if not (above <= 0.0).any():
+            return
+        i = int(np.nanargmin(above))
+        raise fault(
+            simulation,
+            f"particle {p.id[i]} is pulled apart by more than its equation of state holds: its "
+            f"density is {p.density[i]:.6g}, its internal energy {p.internal_energy[i]:.6g}",
+            "a boundary other than open, where the density sum misses neighbours; a weaker "
+            "rarefaction; more particles",
+            int(p.id[i]),
         )
 
     def _check_energy(self, simulation) -> None:

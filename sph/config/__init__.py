@@ -122,10 +122,10 @@ class Physics(Section):
 
     @model_validator(mode="after")
     def _scheme_takes_the_gas(self):
-        from sph import schemes
+        from sph import eos, schemes
 
         scheme = registry.model_class("sph.schemes", self.scheme)
-        if schemes.sums_pressure(scheme) and not hasattr(self.eos_model(), "gamma"):
+        if schemes.sums_pressure(scheme) and not eos.is_ideal(self.eos_model()):
             problem = f'= "{self.scheme}": expected an ideal gas with it, not {self.eos}'
             raise as_error([Issue(("scheme",), problem)])
         return self

@@ -14,6 +14,7 @@ Gamma = Annotated[float, Field(gt=1)]
 # Bounds of the models' parameters: their NamedTuples know types and defaults, not bounds.
 _PARAMETERS = {
     "gamma": Gamma,
+    "p_inf": Annotated[float, Field(ge=0)],
     "strength": Annotated[float, Field(ge=0)],
     "mass": Annotated[float, Field(ge=0)],
     "softening": Annotated[float, Field(ge=0)],

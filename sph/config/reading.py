@@ -145,6 +145,7 @@ def resolve(
             details = _details(error, problem is not None, bool(spoilt))
             elsewhere = _tables_of_keys(models, besides=name)
             issues += explain(model, raw[name], details, name, elsewhere)
+    issues += _gas_issues(found)
     if issues:
         raise ConfigError("\n".join(_reports(source, issues)))
     return found
@@ -238,6 +239,19 @@ def _fill_defaults(raw: dict[str, dict[str, Any]], problem: type[Problem]) -> No
 
 
 # --- checks across keys -----------------------------------------------------------------------
+
+
+def _gas_issues(found: dict[str, Section]) -> list[Issue]:
+    """A problem that is solved for an ideal gas, with another one."""
+    if not {"problem", "physics"} <= found.keys() or not found["problem"].ideal_gas:
+        return []
+    from sph import eos
+
+    physics = found["physics"]
+    if eos.is_ideal(physics.eos_model()):
+        return []
+    text = f"= {value_text(physics.eos)}: expected an ideal gas for {found['problem'].name}"
+    return [Issue(("physics", "eos"), text)]
 
 
 def _shape_issues(raw: dict[str, Any], problem: type[Problem]) -> list[Issue]:

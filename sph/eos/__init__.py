@@ -4,7 +4,13 @@
     sound_speed(density, pressure)           c_s
     internal_energy(density, pressure)       u, the inverse of the first (initial states)
 
+and, where they end elsewhere than at u = 0,
+
+    lowest_energy(density)                   u of cold gas, at and below which there is no sound
+
 All take numbers in compiled code and NumPy arrays of any one shape elsewhere; code units.
+
+One that is an ideal gas in P + p_inf has the attributes `gamma` and `p_inf`, for exact solutions.
 """
 
 from sph import registry
@@ -19,6 +25,16 @@ def pressure(self, density, internal_energy):
 @verb
 def sound_speed(self, density, pressure):
     return self.sound_speed(density, pressure)
+
+
+def is_gamma_law(eos) -> bool:
+    """Whether P + p_inf = (gamma - 1)(rho u - p_inf), which has an exact Riemann solution."""
+    return hasattr(eos, "gamma") and hasattr(eos, "p_inf")
+
+
+def is_ideal(eos) -> bool:
+    """Whether P = (gamma - 1) rho u."""
+    return is_gamma_law(eos) and eos.p_inf == 0.0
 
 
 def make(name: str, **parameters):

@@ -10,6 +10,8 @@ class IdealGas(NamedTuple):
 
     gamma: float
 
+    p_inf = 0.0  # no parameter: what a stiffened gas has
+
     def pressure(self, density, internal_energy):
         return (self.gamma - 1.0) * density * internal_energy  # eq 19
 

@@ -1,4 +1,4 @@
-"""Exact Riemann problem of a gamma-law gas, vacuum included.
+"""Exact Riemann problem of an ideal or stiffened gas, vacuum included.
 
 Reference: Toro, Riemann Solvers and Numerical Methods for Fluid Dynamics (2009), chapter 4.
 Two half-spaces of gas meet at x = 0 when t = 0; everything after depends on xi = x/t only. From
@@ -6,6 +6,10 @@ left to right: undisturbed gas, a shock or a fan, star state, contact, star stat
 undisturbed gas. Where the gases part faster than they can expand, vacuum opens in the middle.
 
 A state of density 0 (and pressure 0) is vacuum; pressure 0 at a density above 0 is cold gas.
+
+`eos` is an equation of state with `gamma` and `p_inf`. A stiffened gas is an ideal one in P + p_inf
+(Menikoff & Plohr 1989, Rev. Mod. Phys. 61, 75): inside, pressure stands for that sum, and outside
+its lowest value, cold gas or vacuum, is -p_inf.
 """
 
 import math
@@ -49,12 +53,33 @@ class WaveSpeeds(NamedTuple):
     right_head: float
 
 
-def star_state(left: State, right: State, gamma: float) -> Star:
+def star_state(left: State, right: State, eos) -> Star:
     """Pressure, velocity and the two densities between the outer waves.
 
     Raises ValueError for a state or a gamma that is no gas, or where both states are vacuum.
     """
-    left, right = _check(left, right, gamma)
+    star = _star_state(*_as_ideal(left, right, eos), eos.gamma)
+    return star._replace(pressure=star.pressure - eos.p_inf)
+
+
+def wave_speeds(left: State, right: State, eos) -> WaveSpeeds:
+    """Speeds of both outer waves and the contact. Raises ValueError as `star_state`."""
+    left, right = _as_ideal(left, right, eos)
+    return _wave_speeds(left, right, _star_state(left, right, eos.gamma), eos.gamma)
+
+
+def solve(left: State, right: State, eos, xi) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Density, velocity and pressure, each (N,), at `xi` (N,) = x/t counted from the diaphragm.
+
+    In vacuum, where velocity has no meaning, it is x/t held between the two edges, which makes it
+    continuous. Infinite `xi` gives the undisturbed states. Raises ValueError as `star_state`.
+    """
+    left, right = _as_ideal(left, right, eos)
+    density, velocity, pressure = _solve(left, right, eos.gamma, np.asarray(xi, dtype=float))
+    return density, velocity, pressure - eos.p_inf
+
+
+def _star_state(left: State, right: State, gamma: float) -> Star:
     if _has_vacuum(left, right, gamma):
         edge_left, edge_right = _vacuum_edges(left, right, gamma)
         return Star(0.0, 0.5 * (edge_left + edge_right), 0.0, 0.0, True)
@@ -70,19 +95,8 @@ def star_state(left: State, right: State, gamma: float) -> Star:
     )
 
 
-def wave_speeds(left: State, right: State, gamma: float) -> WaveSpeeds:
-    """Speeds of both outer waves and the contact. Raises ValueError as `star_state`."""
-    return _wave_speeds(left, right, star_state(left, right, gamma), gamma)
-
-
-def solve(left: State, right: State, gamma: float, xi) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Density, velocity and pressure, each (N,), at `xi` (N,) = x/t counted from the diaphragm.
-
-    In vacuum, where velocity has no meaning, it is x/t held between the two edges, which makes it
-    continuous. Infinite `xi` gives the undisturbed states. Raises ValueError as `star_state`.
-    """
-    xi = np.asarray(xi, dtype=float)
-    star = star_state(left, right, gamma)
+def _solve(left: State, right: State, gamma: float, xi):
+    star = _star_state(left, right, gamma)
     speed = _wave_speeds(left, right, star, gamma)
     from_left = _left_profile(left, star, speed, gamma, xi)
     density, velocity, pressure = _left_profile(
@@ -96,19 +110,22 @@ def solve(left: State, right: State, gamma: float, xi) -> tuple[np.ndarray, np.n
     return density, np.where(density == 0.0, in_vacuum, velocity), pressure
 
 
-def _check(left: State, right: State, gamma: float) -> tuple[State, State]:
-    if not (math.isfinite(gamma) and gamma > 1.0):
-        raise ValueError(f"gamma must be a finite number above 1, not {gamma}")
+def _as_ideal(left: State, right: State, eos) -> tuple[State, State]:
+    """The states of the ideal gas that this one is in P + p_inf, checked."""
+    if not (math.isfinite(eos.gamma) and eos.gamma > 1.0):
+        raise ValueError(f"gamma must be a finite number above 1, not {eos.gamma}")
+    left, right = (s._replace(pressure=s.pressure + eos.p_inf) for s in (left, right))
+    pressure = "P + p_inf" if eos.p_inf else "pressure"
     for side, state in (("left", left), ("right", right)):
         if not all(math.isfinite(value) for value in state):
             raise ValueError(f"the {side} state must be finite, not {tuple(state)}")
         if state.density < 0.0 or state.pressure < 0.0:
             raise ValueError(
-                f"density and pressure of the {side} state must not be negative, "
+                f"density and {pressure} of the {side} state must not be negative, "
                 f"not {state.density} and {state.pressure}"
             )
         if state.density == 0.0 and state.pressure > 0.0:
-            raise ValueError(f"the {side} state has pressure {state.pressure} without density")
+            raise ValueError(f"the {side} state has {pressure} {state.pressure} without density")
     if left.density == 0.0 and right.density == 0.0:
         raise ValueError("both states are vacuum")
     return State(*map(float, left)), State(*map(float, right))

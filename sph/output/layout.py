@@ -161,7 +161,7 @@ def _header(checkpoint, frame: Frame) -> dict[str, Mapping]:
             "HubbleParam": 1.0,
         },
         "HydroScheme": {
-            "Adiabatic index": np.array([physics.eos_model().gamma]),
+            **_equation_of_state(physics.eos_model()),
             "Dimension": np.array([dimension]),
             "Scheme": np.bytes_(physics.scheme),
             "Kernel function": np.bytes_(kernel),
@@ -169,6 +169,15 @@ def _header(checkpoint, frame: Frame) -> dict[str, Mapping]:
             "CFL parameter": np.array([physics.C]),
         },
     }
+
+
+def _equation_of_state(eos) -> dict:
+    """Its name and its parameters, gamma under the name that readers know."""
+    name = type(eos).__module__.rsplit(".", 1)[-1]
+    parameters = {key: np.array([value]) for key, value in eos._asdict().items()}
+    if "gamma" in parameters:
+        parameters["Adiabatic index"] = parameters.pop("gamma")
+    return {"Equation of state": np.bytes_(name), **parameters}
 
 
 def _write_attributes(file: h5py.File, groups: Mapping[str, Mapping]) -> None:

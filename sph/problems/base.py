@@ -37,11 +37,13 @@ class Problem(Section):
       defaults   this problem's defaults for keys of other tables, e.g. {"physics.gamma": 1.4}
       limits     figures of the summary ("energy_drift", "l1.density", …) that its shipped
                  configuration must keep, each with the reason for the number
+      ideal_gas  whether its solution is that of an ideal gas, so that others are refused
       radial     whether, in 2-D and 3-D, the solution depends on the distance from `centre` alone
     """
 
     defaults: ClassVar[dict[str, Any]] = {}
     limits: ClassVar[dict[str, Limit]] = {}
+    ideal_gas: ClassVar[bool] = False
     radial: ClassVar[bool] = False
 
     name: str = Field(description="which problem: `sph list` names them")

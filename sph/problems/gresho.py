@@ -43,6 +43,7 @@ class Problem(base.Problem):
         "time.end": 1.0,
         "output.interval": 0.25,
     }
+    ideal_gas: ClassVar = True
     limits: ClassVar = {
         "energy_drift": base.Limit(
             1e-4, "kinetic energy, at most 1 % of the whole, turns into heat, which is conserved"

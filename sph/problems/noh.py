@@ -35,6 +35,7 @@ class Problem(base.Problem):
         "time.end": 0.6,
         "output.interval": 0.1,
     }
+    ideal_gas: ClassVar = True
     radial: ClassVar = True
     limits: ClassVar = {
         "energy_drift": base.Limit(2e-3, "all kinetic energy turns into heat at a strong shock"),

@@ -22,6 +22,7 @@ class Problem(base.Problem):
         "time.end": 0.05,
         "output.interval": 0.01,
     }
+    ideal_gas: ClassVar = True
     radial: ClassVar = True
     limits: ClassVar = {
         "energy_drift": base.Limit(

@@ -80,8 +80,8 @@ class Problem(base.Problem):
     def error_region(self, eos, time: float, position: np.ndarray) -> tuple[np.ndarray, str]:
         """Where no wave from the ends of the box has come."""
         low, high = self.box[0]
-        low += (VELOCITY + np.sqrt(eos.gamma * PRESSURE / DENSITY)) * time
-        high -= np.sqrt(eos.gamma * AHEAD_PRESSURE / LEAST_DENSITY) * time
+        low += (VELOCITY + eos.sound_speed(DENSITY, PRESSURE)) * time
+        high -= eos.sound_speed(LEAST_DENSITY, AHEAD_PRESSURE) * time
         x = position[0]
         return (low < x) & (x < high), f"{low:.4g} < x < {high:.4g}"
 

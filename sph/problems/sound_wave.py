@@ -36,6 +36,7 @@ class Problem(base.Problem):
         "time.end": 1.0,
         "output.interval": 0.25,
     }
+    ideal_gas: ClassVar = True
     limits: ClassVar = {
         "energy_drift": base.Limit(
             1e-12, "the wave is 1e-12 of the whole energy: round-off of some hundred steps"

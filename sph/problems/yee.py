@@ -28,6 +28,7 @@ class Problem(base.Problem):
         "time.end": 10.0,
         "output.interval": 2.5,
     }
+    ideal_gas: ClassVar = True
     limits: ClassVar = {
         "energy_drift": base.Limit(
             1e-3, "a smooth flow, whose energy the scheme conserves to the order of the time step"

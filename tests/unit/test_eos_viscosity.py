@@ -22,14 +22,44 @@ def test_ideal_gas_by_hand():
     )
 
 
+def test_stiffened_gas_by_hand():
+    water = eos.make("stiffened_gas", gamma=4.4, p_inf=6e8)
+    # u = (1e5 + 4.4 x 6e8)/(3.4 x 1000); c² = 4.4 x 6.001e8/1000
+    assert water.internal_energy(1000.0, 1e5) == pytest.approx(776500.0, rel=FEW_ROUNDINGS)
+    # a difference of numbers of 2.64e9, each a few roundings of 1e-16 off
+    assert water.pressure(1000.0, 776500.0) == pytest.approx(1e5, abs=1e-6)
+    assert water.sound_speed(1000.0, 1e5) ** 2 == pytest.approx(2640440.0, rel=FEW_ROUNDINGS)
+    # at the lowest energy P = -p_inf, where sound stops
+    assert water.pressure(800.0, water.lowest_energy(800.0)) == pytest.approx(-6e8, abs=1e-5)
+
+
+def test_which_equations_of_state_have_exact_solutions():
+    gas = eos.make("ideal_gas", gamma=1.4)
+    assert eos.is_ideal(gas)
+    assert eos.is_gamma_law(gas)
+    water = eos.make("stiffened_gas", gamma=4.4, p_inf=6e8)
+    assert eos.is_gamma_law(water)
+    assert not eos.is_ideal(water)
+    assert eos.is_ideal(eos.make("stiffened_gas", gamma=1.4, p_inf=0.0))
+    assert not eos.is_gamma_law(object())
+
+
+# Parameters, and u: cold gas where u = 0 is cold; elsewhere a sum would lose such a u
+PARAMETERS = {
+    "ideal_gas": ({"gamma": 5 / 3}, ENERGY),
+    "stiffened_gas": ({"gamma": 4.4, "p_inf": 0.3}, np.array([3.0, 1.0, 0.2])),
+}
+
+
 @pytest.mark.parametrize("name", registry.names("sph.eos"))
 def test_energy_and_pressure_are_inverse_and_sound_has_its_speed(name):
-    gas = eos.make(name, gamma=5 / 3)
-    pressure = gas.pressure(DENSITY, ENERGY)
-    np.testing.assert_allclose(gas.internal_energy(DENSITY, pressure), ENERGY, rtol=FEW_ROUNDINGS)
+    parameters, energy = PARAMETERS[name]
+    gas = eos.make(name, **parameters)
+    pressure = gas.pressure(DENSITY, energy)
+    np.testing.assert_allclose(gas.internal_energy(DENSITY, pressure), energy, rtol=FEW_ROUNDINGS)
     # c² = dP/drho along du = P drho / rho²; the difference is off by step² and 1e-16/step
     step = 1e-5 * DENSITY
-    change = [gas.pressure(DENSITY + s, ENERGY + pressure * s / DENSITY**2) for s in (step, -step)]
+    change = [gas.pressure(DENSITY + s, energy + pressure * s / DENSITY**2) for s in (step, -step)]
     np.testing.assert_allclose(
         gas.sound_speed(DENSITY, pressure) ** 2, (change[0] - change[1]) / (2 * step), rtol=1e-8
     )

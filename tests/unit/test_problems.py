@@ -203,7 +203,7 @@ def test_exact_tube_moves_with_its_diaphragm_and_is_the_riemann_solution():
     position = np.array([[-0.4, 0.05, 0.2, 0.45], [0.0, 0.1, -0.1, 0.0]])
     exact = problem.exact(AIR, 0.1, position)
     density, speed, pressure = riemann.solve(
-        riemann.State(1.0, 0.0, 1.0), riemann.State(0.125, 0.0, 0.1), 1.4, (position[0] - 0.1) / 0.1
+        riemann.State(1.0, 0.0, 1.0), riemann.State(0.125, 0.0, 0.1), AIR, (position[0] - 0.1) / 0.1
     )
     np.testing.assert_array_equal(exact["density"], density)
     np.testing.assert_array_equal(exact["velocity"], [speed, np.zeros(4)])
@@ -215,6 +215,48 @@ def test_vacuum_between_parting_gases_has_no_internal_energy():
     problem = ShockTube(left=apart | {"velocity": -5.0}, right=apart | {"velocity": 5.0})
     exact = problem.exact(AIR, 0.05, np.array([[0.0]]))
     assert exact["density"] == exact["internal_energy"] == 0.0
+
+
+def test_report_measures_shocks_contact_and_density_as_by_hand():
+    problem = ShockTube(n=2000, error_range=[-0.45, 0.45])
+    state = problem.initial(AIR)
+    x = state.position[0]
+    exact = problem.exact(AIR, 0.2, state.position)
+    right = problem.exact(AIR, 0.2, state.position / 1.02)  # a shock that is 2 % too far
+    particles = particles_of(state, right["density"], exact["velocity"])
+    hot = (x > 0.2) & (x < 0.22)  # behind the contact, at 0.185
+    particles.internal_energy = np.where(hot, 1.3, 1.0) * exact["internal_energy"]
+    report = problem.report(AIR, 0.2, particles, exact["pressure"])
+    # half of a spacing of 0.5/222 to the right of the diaphragm, over the 0.35 that it travels
+    assert report["shock_right_error"] == pytest.approx(0.02, abs=0.5 / 222 / 2 / 0.35)
+    assert "shock_left_error" not in report  # a fan
+    assert report["contact_energy_excess"] == pytest.approx(0.3, rel=1e-12)
+    particles.density = 1.03 * exact["density"]
+    report = problem.report(AIR, 0.2, particles, exact["pressure"])
+    assert report["density_L1_relative"] == pytest.approx(0.03, rel=1e-12)
+
+
+def test_report_of_parting_gas_takes_the_nearest_to_the_middle():
+    gas = {"density": 1.0, "pressure": 0.4}
+    problem = ShockTube(
+        n=100, left=gas | {"velocity": -2.0}, right=gas | {"velocity": 2.0}, boundary="open"
+    )
+    state = problem.initial(AIR)
+    # all have gone outward by 0.3, so that none is between the fans, |x| < 0.052
+    state.position[0] += 0.3 * np.sign(state.position[0])
+    exact = problem.exact(AIR, 0.15, state.position)
+    particles = particles_of(state, exact["density"], exact["velocity"])
+    particles.internal_energy = 1.2 * exact["internal_energy"]
+    report = problem.report(AIR, 0.15, particles, exact["pressure"])
+    assert report["contact_energy_excess"] == pytest.approx(0.2, rel=1e-12)
+    assert not any(name.startswith(("plateau", "shock")) for name in report)
+
+
+def test_an_equation_of_state_without_exact_solution_has_no_figures():
+    problem, gas = ShockTube(), SimpleNamespace()
+    state = ShockTube().initial(AIR)
+    assert problem.exact(gas, 0.1, state.position) is None
+    assert problem.report(gas, 0.1, particles_of(state, 1.0), None) == {}
 
 
 def test_errors_are_taken_within_the_range_that_is_given():

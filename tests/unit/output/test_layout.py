@@ -1,5 +1,7 @@
 """What yt, pynbody and swiftsimio need, item by item (scripts/check_readers.py asks them)."""
 
+from dataclasses import replace
+
 import h5py
 import numpy as np
 import pytest
@@ -80,11 +82,23 @@ def test_groups_without_datasets(public, make_state):
     assert all(np.ndim(value) == 0 for value in parameters.values())
     scheme = dict(file["HydroScheme"].attrs)
     assert scheme["Adiabatic index"].tolist() == [1.4]
+    assert scheme["Equation of state"] == b"ideal_gas"
     assert scheme["Dimension"].tolist() == [2]
     assert scheme["Scheme"] == b"grad_h"
     assert scheme["Kernel function"] == b"wendland_c2"
     assert scheme["Kernel eta"].tolist() == [1.5]
     assert scheme["CFL parameter"].tolist() == [state.config.physics.C]
+
+
+def test_any_equation_of_state_is_named_with_its_parameters(public, make_state):
+    state = make_state(1)
+    gas = {"name": "stiffened_gas", "gamma": 4.4, "p_inf": 6e8}
+    physics = state.config.physics.model_copy(update={"eos": gas, "gamma": None})
+    changed = replace(state, config=replace(state.config, physics=physics))
+    scheme = dict(public(changed)["HydroScheme"].attrs)
+    assert scheme["Equation of state"] == b"stiffened_gas"
+    assert scheme["Adiabatic index"].tolist() == [4.4]
+    assert scheme["p_inf"].tolist() == [6e8]
 
 
 @pytest.mark.parametrize("alpha", [None, 0.1])

@@ -1,0 +1,111 @@
+"""Figures of a tube beside its exact solution: peaks, plateaus, shocks, contact."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from sph.exact import riemann
+
+# A jump of density less than this, relative to the gas ahead, is no shock to look for: states that
+# are given in digits leave weak waves.
+FAINT = 0.02
+
+
+class Tube(NamedTuple):
+    """What the particles show at a time and what they ought to, all along x (N,)."""
+
+    states: tuple[riemann.State, riemann.State]
+    eos: tuple
+    time: float
+    x: np.ndarray  # from the diaphragm
+    region: np.ndarray  # whether a particle counts
+    density: np.ndarray
+    velocity: np.ndarray
+    pressure: np.ndarray
+    internal_energy: np.ndarray
+    mass: np.ndarray
+    exact: dict[str, np.ndarray]
+
+
+def of(tube: Tube) -> dict[str, float]:
+    """The figures of `Problem.report`, of those that this solution has."""
+    star = riemann.star_state(*tube.states, tube.eos)
+    speed = riemann.wave_speeds(*tube.states, tube.eos)
+    figures = {
+        "peak_density": float(tube.density[tube.region].max(initial=0.0)),
+        "peak_density_exact": max(
+            *(state.density for state in tube.states), star.density_left, star.density_right
+        ),
+    }
+    if tube.region.any():
+        figures["density_L1_relative"] = _relative_error(tube)
+    if tube.time == 0.0 or star.vacuum:
+        return figures
+    figures |= _plateaus(tube, star, speed)
+    figures |= _shocks(tube, star, speed)
+    figures["contact_energy_excess"] = _contact_energy_excess(tube, speed)
+    return figures
+
+
+def _relative_error(tube: Tube) -> float:
+    volume = (tube.mass / tube.density)[tube.region]
+    exact = tube.exact["density"][tube.region]
+    found = tube.density[tube.region]
+    return float((volume * np.abs(found - exact)).sum() / (volume * exact).sum())
+
+
+def _plateaus(tube: Tube, star: riemann.Star, speed: riemann.WaveSpeeds) -> dict[str, float]:
+    """The outer fifth of a plateau, a tenth at either end, is left out: waves are smeared there."""
+    figures = {}
+    for side, start, end, density in (
+        ("left", speed.left_tail, speed.contact, star.density_left),
+        ("right", speed.contact, speed.right_tail, star.density_right),
+    ):
+        margin = 0.1 * (end - start)
+        low, high = ((start + margin) * tube.time, (end - margin) * tube.time)
+        inside = tube.region & (low < tube.x) & (tube.x < high)
+        if not inside.any():
+            continue
+        for name, truth in (
+            ("density", density),
+            ("velocity", star.velocity),
+            ("pressure", star.pressure),
+        ):
+            error = float(np.median(getattr(tube, name)[inside])) - truth
+            figures[f"plateau_{side}_{name}_error"] = error / abs(truth) if truth else error
+    return figures
+
+
+def _shocks(tube: Tube, star: riemann.Star, speed: riemann.WaveSpeeds) -> dict[str, float]:
+    """Where the density crosses the middle of its jump, counted from outside."""
+    figures = {}
+    inward = np.argsort(tube.x)
+    for side, ahead, shock, tail, behind, order in (
+        ("left", tube.states[0], speed.left_head, speed.left_tail, star.density_left, inward),
+        (
+            "right", tube.states[1], speed.right_head, speed.right_tail, star.density_right,
+            inward[::-1],
+        ),
+    ):  # fmt: skip
+        if shock != tail or behind < (1.0 + FAINT) * ahead.density:
+            continue
+        order = order[tube.region[order]]
+        x, above = tube.x[order], tube.density[order] - 0.5 * (ahead.density + behind)
+        first = int(np.argmax(above > 0.0))
+        if first == 0:  # none is so dense, or the region begins behind the shock
+            continue
+        share = above[first] / (above[first] - above[first - 1])
+        found = x[first] + share * (x[first - 1] - x[first])
+        travelled = (shock - ahead.velocity) * tube.time
+        figures[f"shock_{side}_error"] = float((found - shock * tube.time) / travelled)
+    return figures
+
+
+def _contact_energy_excess(tube: Tube, speed: riemann.WaveSpeeds) -> float:
+    """Over the star states, or where no particle is in them over the nearest two."""
+    x, contact = tube.x, speed.contact * tube.time
+    between = (speed.left_tail * tube.time < x) & (x < speed.right_tail * tube.time)
+    for side in (x < contact, x >= contact):
+        if side.any():
+            between[np.argmin(np.where(side, np.abs(x - contact), np.inf))] = True
+    return float(np.max(tube.internal_energy[between] / tube.exact["internal_energy"][between])) - 1
