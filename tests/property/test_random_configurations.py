@@ -19,11 +19,11 @@ numbers = st.one_of(
     st.floats(-2.0, 2.0),
     st.sampled_from([0.0, -0.0, 1e-300, 1e300, float("inf"), float("nan"), 2**63 - 1, 10**6]),
 )
-words = st.sampled_from(
-    "open mirror periodic cubic hexagonal bcc random grad_h wendland_c4 cubic_spline converged all "
-    "approach stiffened_gas number équilibre \u200b".split(" ")
-    + [""]
-)
+WORDS = """
+open mirror periodic cubic hexagonal bcc random grad_h wendland_c4 cubic_spline converged all approach
+stiffened_gas number équilibre
+"""
+words = st.sampled_from([*WORDS.split(), ""])
 scalars = st.one_of(numbers, st.booleans(), words)
 values = st.recursive(
     scalars,
