@@ -13,10 +13,11 @@ def _source_hash() -> str:
     """Hash of every source file of the package.
 
     Numba's on-disk cache of a function does not see an edit to a function it calls in another
-    file, so compiled code is kept in a directory that no two versions of the sources share.
+    file, so compiled code is kept in a directory that no two versions of the sources share. Nor
+    does it see that bounds are to be checked: code with and without must not meet.
     """
     root = Path(__file__).parent
-    digest = hashlib.sha256()
+    digest = hashlib.sha256(os.environ.get("NUMBA_BOUNDSCHECK", "").encode())
     for path in sorted(root.rglob("*.py")):
         digest.update(str(path.relative_to(root)).encode())
         digest.update(path.read_bytes())
