@@ -2,7 +2,8 @@
 
 Riemann states over 8 decades of density and pressure at Mach numbers up to 1e3, and particles
 scattered at random. A run may end with words (NumericalError): that is an answer. What it may not
-do is go on with a state that means nothing. With equal masses it may not even end.
+do is go on with a state that means nothing. Where masses are alike it may end only because so few
+particles leave supports wider than the box.
 """
 
 import dataclasses
@@ -169,8 +170,8 @@ def test_riemann_states(scene, densities, pressures, mach, direction, equal_mass
     mass = 0.5 * rho[side] / count[side]
     state = InitialState(x[None], v[side][None], mass, (P / (0.4 * rho))[side])
     words = attempt(state, 1, boundary, scene)
-    if equal_masses:
-        assert not words
+    if equal_masses and words:
+        assert "needs a kernel support" in words
 
 
 @pytest.mark.parametrize("scene", SCENES)
@@ -181,13 +182,15 @@ def test_riemann_states(scene, densities, pressures, mach, direction, equal_mass
     spread=st.floats(0.0, 4.0),
     mach=speeds,
     clump=st.floats(0.05, 1.0),
+    cold=st.sampled_from([0.0, 0.0, 0.5, 1.0]),
 )
-def test_random_particles(scene, seed, dimension, boundary, spread, mach, clump):
-    """Scattered, some of them crowded, with masses and energies over `spread` decades."""
+def test_random_particles(scene, seed, dimension, boundary, spread, mach, clump, cold):
+    """Scattered, some crowded, masses and energies over `spread` decades, a part without energy."""
     random = np.random.default_rng(seed)
     n = 40 if dimension == 1 else 120
     x = random.random((dimension, n))
     x[:, : n // 4] = 0.5 + clump * (x[:, : n // 4] - 0.5)
     mass, energy = 10.0 ** random.uniform(-spread / 2, spread / 2, (2, n))
     v = mach * np.sqrt(energy) * random.normal(size=x.shape)
+    energy[random.random(n) < cold] = 0.0
     attempt(InitialState(x, v, mass / n, energy), dimension, boundary, scene, eta=1.2)
