@@ -57,9 +57,9 @@ class Domain:
                 x[outside] = np.where(x[outside] >= hi, lo, x[outside])
             else:
                 beyond = outside[x[outside] != hi]
-                x[beyond] = np.where(x[beyond] < lo, 2 * lo, 2 * hi) - x[beyond]
+                x[beyond], turned = _between_walls(x[beyond], lo, hi)
                 for velocity in velocities:
-                    velocity[axis, beyond] *= -1
+                    velocity[axis, beyond[turned]] *= -1
 
     def check_reach(self, reach: float, particle: int) -> None:
         """Raise NumericalError where a kernel's support is wider than the box.
@@ -73,6 +73,22 @@ class Domain:
                     f"{boundary} box along {'xyz'[axis]} ({hi - lo:.4g}).\n"
                     "Try: more particles, a smaller physics.eta, or a wider domain along that axis."
                 )
+
+
+def _between_walls(x, lo: float, hi: float):
+    """Where points beyond walls at `lo` and `hi` come to rest, and whether they have turned.
+
+    A fast particle may meet walls many times in a step; each second time it goes on as before.
+    """
+    length = hi - lo
+    inside = np.where(x < lo, 2 * lo, 2 * hi) - x
+    turned = np.ones(x.size, dtype=bool)
+    far = (inside < lo) | (inside > hi)  # once is not enough
+    rest = np.mod(x[far] - lo, 2 * length)
+    back = rest > length
+    inside[far] = lo + np.where(back, 2 * length - rest, rest)
+    turned[far] = back
+    return inside, turned
 
 
 def _axis_images(lo: float, hi: float, boundary: str) -> list[tuple[float, float]]:

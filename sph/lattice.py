@@ -38,7 +38,7 @@ def unit_cell(kind: str, dimension: int) -> Cell:
 
 def checked(kind: str, dimension: int | None) -> str:
     """`kind` itself if it can be filled in so many dimensions (None: any). Else ValueError."""
-    if dimension is not None and kind != "relaxed":
+    if dimension is not None and kind not in ("relaxed", "random"):
         unit_cell(kind, dimension)
     return kind
 
@@ -89,11 +89,14 @@ def grid(box: np.ndarray, kind: str, counts) -> np.ndarray:
 def fill(box: np.ndarray, n: int, kind: str, seed: int = 0, even: bool = False) -> np.ndarray:
     """Positions (D, N), N nearest to n, one equal volume each, that fill `box` (D, 2).
 
-    `kind` is one of `unit_cell` or "relaxed", a periodic glass drawn from `seed`. `even`
+    `kind` is one of `unit_cell`, "relaxed", a periodic glass drawn from `seed`, or "random",
+    places drawn from it evenly over the box (a Poisson process given its number). `even`
     asks for an even number of cells along each axis: the centre of the box is a corner of cells.
     Raises ValueError for a lattice that does not exist in so many dimensions.
     """
     box = np.asarray(box, dtype=float)
+    if kind == "random":
+        return np.random.default_rng(seed).uniform(box[:, :1], box[:, 1:], (len(box), n))
     multiple = 2 if even else 1
     cell = unit_cell("cubic" if kind == "relaxed" else kind, len(box))
     counts = whole_cells(box, n / len(cell.sites), cell.sides, multiple)

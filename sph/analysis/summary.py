@@ -36,7 +36,8 @@ def of_run(simulation, history: dict[str, np.ndarray], status: str, reason: str 
     }
     if status != "failed":
         result["errors"] = errors.against_exact(problem, eos, simulation.time, particles, pressure)
-        result["report"] = problem.report(eos, simulation.time, particles, pressure)
+        report = problem.report(eos, simulation.time, particles, pressure)
+        result["report"] = report | problem.over_time(history)
     return result
 
 

@@ -94,3 +94,7 @@ class Problem(Section):
     def report(self, eos, time: float, particles, pressure) -> dict[str, float]:
         """Further figures of the summary at the end of a run, e.g. a shock's radius."""
         return {}
+
+    def over_time(self, history: dict[str, np.ndarray]) -> dict[str, float]:
+        """The same from the whole history, whose columns are (steps,), e.g. when a mode peaked."""
+        return {}

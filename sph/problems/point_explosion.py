@@ -46,7 +46,10 @@ class Problem(base.Problem):
     background_pressure: float = Field(default=1e-6, gt=0.0, description="pressure of the cold gas")
     energy: float = Field(default=1.0, gt=0.0, description="energy released at the centre")
     energy_particles: int = Field(
-        default=32, ge=1, description="particles nearest the centre that share the energy equally"
+        default=32,
+        ge=1,
+        description="particles nearest the centre that share the energy equally; where it is one, "
+        "the lattice is shifted to put it in the very centre",
     )
     lattice: Literal["cubic", "hexagonal", "bcc", "relaxed"] = Field(
         default="cubic",
@@ -65,6 +68,8 @@ class Problem(base.Problem):
         Raises ConfigError if there are fewer particles than are to share the energy.
         """
         position = placement.fill(self.box, self.n, self.lattice, even=True)
+        if self.energy_particles == 1:
+            position = self._centred(position)
         n = position.shape[1]
         if n < self.energy_particles:
             raise ConfigError(
@@ -136,6 +141,15 @@ class Problem(base.Problem):
         """Offset (D, N) from the centre of the box, and its length (N,)."""
         offset = position - self.box.mean(axis=1)[:, None]
         return offset, np.sqrt((offset**2).sum(axis=0))
+
+    def _centred(self, position: np.ndarray) -> np.ndarray:
+        """The lattice moved by less than a spacing so that a particle lies in the centre.
+
+        What leaves the box on one side enters on the other, as if all axes were periodic.
+        """
+        moved = position - self._from_centre(position)[0][:, self._nearest(position)]
+        low, length = self.box[:, :1], np.diff(self.box)
+        return low + np.mod(moved - low, length)
 
     def _nearest(self, position: np.ndarray) -> np.ndarray:
         """Indices of the `energy_particles` nearest the centre; of equally near ones the first."""

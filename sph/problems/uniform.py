@@ -38,14 +38,17 @@ class Problem(base.Problem):
     velocity: float | list[float] = Field(
         default=0.0, description="velocity: a number along x, or a list with one for each axis"
     )
-    lattice: Literal["cubic", "hexagonal", "bcc", "relaxed"] = Field(
+    lattice: Literal["cubic", "hexagonal", "bcc", "relaxed", "random"] = Field(
         default="cubic",
-        description='"cubic", "hexagonal" (2-D), "bcc" (3-D) or "relaxed", a glass',
+        description='"cubic", "hexagonal" (2-D), "bcc" (3-D), "relaxed", a glass, or "random", '
+        "each particle anywhere",
     )
     noise: float = Field(
         default=0.0, ge=0.0, le=0.5, description="largest shift along each axis, in spacings"
     )
-    seed: int = Field(default=0, ge=0, description="seed of the noise and of the relaxed lattice")
+    seed: int = Field(
+        default=0, ge=0, description="seed of noise, relaxed lattice and random places"
+    )
 
     @field_validator("velocity")
     @classmethod
@@ -84,4 +87,17 @@ class Problem(base.Problem):
             "velocity": velocity,
             "pressure": pressure,
             "internal_energy": eos.internal_energy(density, pressure),
+        }
+
+    def report(self, eos, time: float, particles, pressure) -> dict[str, float]:
+        """Largest over smallest of what is to stay uniform, minus 1, and how far it has come.
+
+        crossings: lengths of the box along x that the gas has moved.
+        """
+        speed = self.velocity[0] if isinstance(self.velocity, list) else self.velocity
+        density, energy = particles.density, particles.internal_energy
+        return {
+            "density_spread": float(density.max() / density.min() - 1.0),
+            "energy_spread": float(energy.max() / energy.min() - 1.0),
+            "crossings": abs(speed) * time / float(self.box[0, 1] - self.box[0, 0]),
         }

@@ -70,3 +70,12 @@ def test_support_wider_than_a_closed_box_is_refused_with_the_axis():
     with pytest.raises(NumericalError, match=r"particle 7 .*mirror box along y \(0\.5\)"):
         domain.check_reach(0.51, 7)
     Domain(BOX, ("open",) * 3).check_reach(1e9, 7)
+
+
+def test_mirrors_turn_a_fast_particle_as_often_as_it_meets_them():
+    # from 0.25 by -1, then +/- 2 k: walls at -1 and 1, the path repeats after 4
+    start, shifts = 0.25, np.array([1.0, 2.0, 3.0, 3.5, -1.5, -3.0, 401.0, -402.5])
+    position, velocity = (start + shifts)[None], np.sign(shifts)[None].copy()
+    Domain(BOX[:1], ("mirror",)).bring_inside(position, [velocity])
+    np.testing.assert_array_equal(position[0], [0.75, -0.25, -0.75, -0.25, -0.75, 0.75, 0.75, 0.25])
+    np.testing.assert_array_equal(velocity[0], [-1, -1, 1, 1, 1, 1, -1, 1])

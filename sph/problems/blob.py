@@ -1,0 +1,158 @@
+"""A dense cloud in a supersonic wind, in pressure balance with it.
+
+Agertz et al. (2007), MNRAS 380, 963: in grid codes the cloud is torn apart within some two times of
+growth of the Kelvin-Helmholtz instability; classical SPH keeps part of it for ever, as contacts
+there have a surface tension.
+"""
+
+from typing import Annotated, ClassVar, Literal
+
+import numpy as np
+from pydantic import Field, model_validator
+
+from sph import lattice as placement
+from sph.problems import base
+
+_SHARED = base.Problem.model_fields
+
+DENSITY = PRESSURE = 1.0  # of the wind
+LENGTH = 4.0  # of the box along the wind, in widths
+# Agertz et al., section 3.1: what counts as cloud, of the first density and the wind's temperature
+STILL_DENSE, STILL_COLD = 0.64, 0.9
+
+
+class Problem(base.Problem):
+    """A cloud of cold gas blown upon by a wind along x; how much of it survives."""
+
+    defaults: ClassVar = {
+        "physics.gamma": 5.0 / 3.0,
+        "physics.alpha": 1.0,
+        "time.end": 7.0,
+        "output.interval": 1.0,
+    }
+    limits: ClassVar = {
+        "energy_drift": base.Limit(
+            1e-3, "two thirds of the energy are the wind's motion, a part of which turns to heat"
+        ),
+        "cloud_mass_fraction": base.Limit(
+            1.05, "gas that the wind heats and thins does not turn into cloud"
+        ),
+        "cloud_velocity": base.Limit(1.0, "the wind cannot drive the cloud faster than itself"),
+    }
+
+    name: Literal["blob"] = "blob"
+    dimension: Literal[2, 3] = Field(default=2, description="number of space dimensions")
+    n: Annotated[int, _SHARED["n"]] = 10000
+    domain: list[float] = Field(
+        default=[-5.0, 5.0],
+        min_length=2,
+        max_length=2,
+        description="[lo, hi] across the wind; along it the box begins at lo, too, and is four "
+        "times as long",
+    )
+    boundary: Literal["periodic"] = Field(default="periodic", description="of all axes")
+    radius: float = Field(
+        default=1.0, gt=0.0, description="radius of the cloud, whose centre is half a width from lo"
+    )
+    density_ratio: float = Field(default=10.0, gt=1, description="density of cloud over wind's")
+    mach: float = Field(
+        default=2.7, ge=0.0, description="speed of the wind over its speed of sound"
+    )
+
+    @model_validator(mode="after")
+    def _cloud_fits(self):
+        low, high = self.domain
+        if 2.0 * self.radius >= high - low > 0.0:
+            raise ValueError(
+                f"radius = {self.radius}: expected a cloud narrower than the box, {high - low:g}"
+            )
+        return self
+
+    @property
+    def box(self) -> np.ndarray:
+        low, high = self.domain
+        return np.array([[low, low + LENGTH * (high - low)]] + [[low, high]] * (self.dimension - 1))
+
+    @property
+    def centre(self) -> np.ndarray:
+        """(D,) the middle of the cloud at t = 0."""
+        return np.full(self.dimension, sum(self.domain) / 2)
+
+    def wind(self, eos) -> float:
+        """Speed of the wind."""
+        return float(self.mach * eos.sound_speed(DENSITY, PRESSURE))
+
+    def growth_time(self, eos) -> float:
+        """Time in which a wave as long as the cloud grows: 1.6 crushing times (their eq 3)."""
+        return 1.6 * 2.0 * self.radius * float(np.sqrt(self.density_ratio)) / self.wind(eos)
+
+    def initial(self, eos) -> base.InitialState:
+        """Particles of one mass on two cubic lattices; those of the cloud come first."""
+        around = placement.fill(self.box, self._sites(), "cubic")
+        mass = DENSITY * np.prod(np.diff(self.box)) / around.shape[1]
+        around = around[:, self._distance(around) >= self.radius]
+        cloud = self._cloud(mass)
+        position = np.hstack([cloud, around])
+        state = self.exact(eos, 0.0, position)
+        each = np.full(position.shape[1], mass)
+        return base.InitialState(position, state["velocity"], each, state["internal_energy"])
+
+    def exact(self, eos, time: float, position: np.ndarray) -> dict[str, np.ndarray] | None:
+        """The initial state, at (D, N) positions; None later, when nobody knows it."""
+        if time > 0.0:
+            return None
+        in_cloud = self._distance(position) < self.radius
+        density = np.where(in_cloud, self.density_ratio * DENSITY, DENSITY)
+        pressure = np.full(density.size, PRESSURE)
+        velocity = np.zeros_like(position)
+        velocity[0] = np.where(in_cloud, 0.0, self.wind(eos))
+        return {
+            "density": density,
+            "velocity": velocity,
+            "pressure": pressure,
+            "internal_energy": eos.internal_energy(density, pressure),
+        }
+
+    def diagnostics(self, particles) -> dict[str, float]:
+        """cloud_mass_fraction: mass of gas still dense and cold over that of the cloud.
+
+        The wind, nine tenths of the particles and more, has the median temperature (as u).
+        """
+        u = particles.internal_energy
+        dense = particles.density > STILL_DENSE * self.density_ratio * DENSITY
+        cold = u < STILL_COLD * np.median(u)
+        unit_ball = (np.pi, 4.0 / 3.0 * np.pi)[self.dimension - 2]
+        cloud = self.density_ratio * DENSITY * unit_ball * self.radius**self.dimension
+        return {"cloud_mass_fraction": float(particles.mass[dense & cold].sum() / cloud)}
+
+    def report(self, eos, time: float, particles, pressure) -> dict[str, float]:
+        """What is left of the cloud and how fast it goes.
+
+        cloud_velocity: mean velocity along x of what was the cloud, over the wind's; growth_times:
+        the time in units of `growth_time`.
+        """
+        count = self._cloud(particles.mass[0]).shape[1]
+        velocity = particles.velocity[0, particles.id <= count].mean()
+        return self.diagnostics(particles) | {
+            "cloud_velocity": float(velocity / self.wind(eos)),
+            "growth_times": time / self.growth_time(eos),
+        }
+
+    def _distance(self, position: np.ndarray) -> np.ndarray:
+        return np.sqrt(((position - self.centre[:, None]) ** 2).sum(axis=0))
+
+    def _sites(self) -> int:
+        """Sites of a lattice as in the wind over the whole box, for n particles in all."""
+        volume = np.prod(np.diff(self.box))
+        cloud = (np.pi, 4.0 / 3.0 * np.pi)[self.dimension - 2] * self.radius**self.dimension
+        return max(1, round(self.n / (1.0 + (self.density_ratio - 1.0) * cloud / volume)))
+
+    def _cloud(self, mass: float) -> np.ndarray:
+        """Positions (D, N) of particles of that mass in the cloud, its middle a corner of cells."""
+        spacing = (mass / (self.density_ratio * DENSITY)) ** (1.0 / self.dimension)
+        half = int(np.ceil(self.radius / spacing))
+        cube = half * spacing * np.array([[-1.0, 1.0]] * self.dimension)
+        position = self.centre[:, None] + placement.grid(
+            cube, "cubic", (2 * half,) * self.dimension
+        )
+        return position[:, self._distance(position) < self.radius]

@@ -1,0 +1,186 @@
+"""Gas at rest at one pressure, whose density changes by orders of magnitude: nothing may happen.
+
+Either at a step, or evenly in the logarithm across the box; by the masses of evenly spaced
+particles, or by the spacing of particles of one mass. (A step in the spacing of particles of one
+mass is a shock tube with one pressure.)
+"""
+
+from typing import Annotated, ClassVar, Literal
+
+import numpy as np
+from pydantic import Field, model_validator
+
+from sph import lattice as placement
+from sph.problems import base
+
+_SHARED = base.Problem.model_fields
+
+FEWEST_ACROSS = 4  # a support at eta = 1.6 is three spacings wide, and must not exceed the box
+
+
+class Problem(base.Problem):
+    """Hydrostatic gas with a large contrast of density along x: the null test of contacts."""
+
+    defaults: ClassVar = {
+        "physics.gamma": 5.0 / 3.0,
+        "physics.alpha": 1.0,
+        "time.end": 0.005,
+        "output.interval": 0.001,
+    }
+    limits: ClassVar = {
+        "energy_drift": base.Limit(1e-6, "gas at rest: heating is of second order in its velocity"),
+        "mach_number": base.Limit(0.05, "velocities of an error of pressure of some per cent"),
+        "pressure_error": base.Limit(
+            0.25,
+            "a kernel smooths the kink that a mirror makes of a gradient: 20 % there, 1 % in L1",
+        ),
+    }
+
+    name: Literal["contrast"] = "contrast"
+    dimension: Annotated[int, _SHARED["dimension"]] = 1
+    n: Annotated[int, _SHARED["n"]] = 200
+    domain: list[float] | list[list[float]] = Field(
+        default=[0.0, 1.0], description="[lo, hi] for every axis alike, or one [lo, hi] per axis"
+    )
+    boundary: Literal["mirror"] = Field(
+        default="mirror", description="along x; y and z are periodic"
+    )
+    ratio: float = Field(default=1e6, gt=1, description="densest over thinnest gas")
+    profile: Literal["step", "graded"] = Field(
+        default="step",
+        description='"step": dense gas below the middle of x, thin above; "graded": the density '
+        "falls evenly in its logarithm",
+    )
+    masses: Literal["equal", "equal_spacing"] = Field(
+        default="equal_spacing",
+        description='"equal": one mass, and spacings after the density, which must be graded; '
+        '"equal_spacing": one spacing, and masses after the density',
+    )
+    pressure: float = Field(default=1.0, gt=0.0, description="pressure everywhere")
+
+    @model_validator(mode="after")
+    def _holds_the_thin_gas(self):
+        if self.masses == "equal" and self.profile == "step":
+            raise ValueError(
+                'masses = "equal": expected profile = "graded" with it; for a step between '
+                "particles of one mass take shock_tube with one pressure on both sides"
+            )
+        if self.masses == "equal" and self._fewest_across() < FEWEST_ACROSS and self._is_box():
+            raise ValueError(
+                f"n = {self.n} particles of one mass are {self._fewest_across()} spacings of the "
+                f"thinnest gas along an axis: expected {FEWEST_ACROSS}; take more particles, a "
+                'smaller ratio, or masses = "equal_spacing"'
+            )
+        return self
+
+    def _is_box(self) -> bool:
+        domain = np.array(self.domain, dtype=object)
+        return domain.shape in [(2,), (self.dimension, 2)]
+
+    @property
+    def boundaries(self) -> tuple[str, ...]:
+        return ("mirror",) + ("periodic",) * (self.dimension - 1)
+
+    def initial(self, eos) -> base.InitialState:
+        """The densest gas has density 1. Particles lie on a cubic lattice, or in layers of such."""
+        if self.masses == "equal":
+            position = self._layers()
+            n = position.shape[1]
+            mass = np.full(n, self._mass(1.0) * self._volume() / n)
+        else:
+            position = placement.fill(self.box, self.n, "cubic")
+            n = position.shape[1]
+            mass = self._density(position) * np.prod(np.diff(self.box)) / n
+        state = self.exact(eos, 0.0, position)
+        return base.InitialState(position, state["velocity"], mass, state["internal_energy"])
+
+    def exact(self, eos, time: float, position: np.ndarray) -> dict[str, np.ndarray]:
+        """The initial state for ever, at (D, N) positions."""
+        density = self._density(position)
+        pressure = np.full(density.size, self.pressure)
+        return {
+            "density": density,
+            "velocity": np.zeros_like(position),
+            "pressure": pressure,
+            "internal_energy": eos.internal_energy(density, pressure),
+        }
+
+    def report(self, eos, time: float, particles, pressure) -> dict[str, float]:
+        """How far the gas is from rest and balance.
+
+        mach_number: the largest velocity over the sound speed there; pressure_error: the largest
+        |P/P_0 - 1|; support_ratio: the widest support over the narrowest.
+        """
+        speed = np.sqrt((particles.velocity**2).sum(axis=0))
+        sound = eos.sound_speed(particles.density, pressure)
+        return {
+            "mach_number": float((speed / sound).max()),
+            "pressure_error": float(np.abs(pressure / self.pressure - 1.0).max()),
+            "density_ratio": float(particles.density.max() / particles.density.min()),
+            "support_ratio": float(particles.support.max() / particles.support.min()),
+        }
+
+    # --- the profile, with s = 0 to 1 along x ---
+
+    def _along(self, x):
+        low, high = self.box[0]
+        return (x - low) / (high - low)
+
+    def _density(self, position: np.ndarray) -> np.ndarray:
+        s = self._along(position[0])
+        if self.profile == "step":
+            return np.where(s < 0.5, 1.0, 1.0 / self.ratio)
+        return self.ratio**-s
+
+    def _mass(self, s):
+        """Mass below s of graded gas, for a cross section and a length of 1."""
+        return (1.0 - self.ratio**-s) / np.log(self.ratio)
+
+    def _place(self, mass):
+        """Inverse of `_mass`."""
+        return -np.log1p(-mass * np.log(self.ratio)) / np.log(self.ratio)
+
+    # --- layers of particles of one mass ---
+
+    def _volume(self) -> float:
+        """Volume of the box."""
+        return float(np.prod(np.diff(self.box)))
+
+    def _fewest_across(self) -> int:
+        """Spacings of the thinnest gas along the shortest axis."""
+        thinnest = self._mass(1.0) * self._volume() / self.n * self.ratio
+        return int(np.diff(self.box).min() / thinnest ** (1.0 / self.dimension))
+
+    def _layers(self) -> np.ndarray:
+        """Positions (D, N) of particles of one mass in layers across x, near n of them in all.
+
+        Each layer has whole numbers of particles across and takes up the mass of these; the last
+        one ends at the box, for which masses are scaled by a little.
+        """
+        widths = np.diff(self.box)[1:, 0]
+        total = self._mass(1.0)
+        counts, below = [], [0.0]
+        while below[-1] < total * (1.0 - 1e-12):
+            density = self.ratio ** -self._place(below[-1])
+            spacing = (total * self._volume() / (self.n * density)) ** (1.0 / self.dimension)
+            across = tuple(int(max(1, round(width / spacing))) for width in widths)
+            counts.append(across)
+            below.append(below[-1] + total / self.n * float(np.prod(across)))
+        if len(counts) > 1 and below[-1] - total > 0.5 * (below[-1] - below[-2]):
+            counts.pop(), below.pop()  # less than half of the last layer would be filled
+        edges = np.array(below) * (total / below[-1])
+        middles = self._x(self._place(0.5 * (edges[1:] + edges[:-1])))
+        return np.hstack(
+            [self._layer(x, across) for x, across in zip(middles, counts, strict=True)]
+        )
+
+    def _layer(self, x: float, across: tuple[int, ...]) -> np.ndarray:
+        """Positions of one layer at x, a grid of `across` cells."""
+        if not across:
+            return np.array([[x]])
+        in_layer = placement.grid(self.box[1:], "cubic", across)
+        return np.vstack([np.full(in_layer.shape[1], x), in_layer])
+
+    def _x(self, s):
+        low, high = self.box[0]
+        return low + s * (high - low)

@@ -1,0 +1,138 @@
+"""A cold ring of gas around a point mass: on circular orbits nothing happens but shear.
+
+Cartwright, Stamatellos & Whitworth (2009), MNRAS 395, 2373; Hosono, Saitoh & Makino (2016), ApJS
+224, 32. Particles that shear past one another are disturbed by the errors of their pressure forces
+and by viscosity, which takes shear for compression; after some orbits the ring breaks up.
+"""
+
+from typing import Annotated, ClassVar, Literal
+
+import numpy as np
+from pydantic import Field, model_validator
+
+from sph.problems import base
+
+_SHARED = base.Problem.model_fields
+
+DENSITY = 1.0
+# Where the ring counts as broken: rms of density over exact, minus 1, and rms of the distance of
+# particles from their orbits over the width of the ring. Both are of its inner part, of which the
+# ends that nothing holds, EDGE of the width on either side, are left out.
+DENSITY_BOUND, RADIUS_BOUND = 0.1, 0.02
+EDGE = 0.15
+
+
+class Problem(base.Problem):
+    """A cold ring in circular orbits about a point mass of 1: how many orbits it stays whole."""
+
+    defaults: ClassVar = {
+        "physics.gamma": 5.0 / 3.0,
+        "physics.alpha": 0.1,
+        "physics.external": {"name": "point_mass", "mass": 1.0},
+        "time.end": 31.41592653589793,
+        "output.interval": 6.283185307179586,
+    }
+    limits: ClassVar = {
+        "energy_drift": base.Limit(1e-3, "circular orbits: kinetic and potential energy stay"),
+    }
+
+    name: Literal["keplerian_ring"] = "keplerian_ring"
+    dimension: Literal[2] = Field(default=2, description="number of space dimensions")
+    n: Annotated[int, _SHARED["n"]] = 3000
+    domain: Annotated[list[float] | list[list[float]], _SHARED["domain"]] = Field(
+        default=[-2.0, 2.0]
+    )
+    boundary: Literal["open"] = Field(default="open", description="of both axes")
+    inner: float = Field(default=0.5, gt=0.0, description="inner radius of the ring")
+    outer: float = Field(default=1.5, gt=0.0, description="outer radius of the ring")
+    pressure: float = Field(default=1e-6, gt=0.0, description="pressure of the cold gas at t = 0")
+
+    @model_validator(mode="after")
+    def _is_a_ring(self):
+        if not self.inner < self.outer:
+            raise ValueError(f"inner = {self.inner}: expected less than outer = {self.outer}")
+        return self
+
+    @property
+    def width(self) -> float:
+        return self.outer - self.inner
+
+    @property
+    def period(self) -> float:
+        """Of the orbit in the middle of the ring."""
+        return 2.0 * np.pi * (0.5 * (self.inner + self.outer)) ** 1.5
+
+    def initial(self, eos) -> base.InitialState:
+        """Circles of evenly spaced particles, each circle turned against the one inside it."""
+        radius, angle, mass = self._circles()
+        position = radius * np.array([np.cos(angle), np.sin(angle)])
+        state = self.exact(eos, 0.0, position)
+        return base.InitialState(position, state["velocity"], mass, state["internal_energy"])
+
+    def exact(self, eos, time: float, position: np.ndarray) -> dict[str, np.ndarray]:
+        """The ring for ever, at (2, N) positions, which are taken to be in it."""
+        radius = np.sqrt((position**2).sum(axis=0))
+        x, y = position
+        density, pressure = np.full(radius.size, DENSITY), np.full(radius.size, self.pressure)
+        return {
+            "density": density,
+            "velocity": np.array([-y, x]) / np.where(radius > 0.0, radius, np.inf) ** 1.5,
+            "pressure": pressure,
+            "internal_energy": eos.internal_energy(density, pressure),
+        }
+
+    def error_region(self, eos, time: float, position: np.ndarray) -> tuple[np.ndarray, str]:
+        """The ring but for its edges."""
+        low, high = self._kept
+        radius = np.sqrt((position**2).sum(axis=0))
+        return (low < radius) & (radius < high), f"{low:.4g} < r < {high:.4g}"
+
+    def diagnostics(self, particles) -> dict[str, float]:
+        """How far particles that began away from the edges are from the ring as it began.
+
+        density_deviation: rms of rho/rho_0 - 1; radial_deviation: rms of r - r_0 over the width.
+        """
+        start = self._circles()[0][particles.id - 1]
+        low, high = self._kept
+        kept = (low < start) & (start < high)
+        radius = np.sqrt((particles.position**2).sum(axis=0))
+        return {
+            "density_deviation": _rms(particles.density[kept] / DENSITY - 1.0),
+            "radial_deviation": _rms(radius[kept] - start[kept]) / self.width,
+        }
+
+    def over_time(self, history: dict[str, np.ndarray]) -> dict[str, float]:
+        """orbits_intact: orbits at its middle before the ring deviates by more than the bounds.
+
+        The last time of the history where it never does.
+        """
+        broken = (history["density_deviation"] > DENSITY_BOUND) | (
+            history["radial_deviation"] > RADIUS_BOUND
+        )
+        last = int(np.argmax(broken)) if broken.any() else broken.size - 1
+        return {
+            "orbits": float(history["t"][-1] / self.period),
+            "orbits_intact": float(history["t"][last] / self.period),
+        }
+
+    @property
+    def _kept(self) -> tuple[float, float]:
+        return self.inner + EDGE * self.width, self.outer - EDGE * self.width
+
+    def _circles(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Radius, angle and mass (N,) of the particles, by ID: near squares of one area."""
+        area = np.pi * (self.outer**2 - self.inner**2)
+        number = max(1, round(self.width / np.sqrt(area / self.n)))
+        edges = np.linspace(self.inner, self.outer, number + 1)
+        rings = np.pi * np.diff(edges**2)
+        counts = np.maximum(1, np.round(rings * self.n / area)).astype(int)
+        ring = np.repeat(np.arange(number), counts)
+        within = np.arange(ring.size) - np.repeat(np.cumsum(counts) - counts, counts)
+        # turns of the golden ratio never line up
+        angle = 2.0 * np.pi * (within / counts[ring] + 0.6180339887498949 * ring)
+        radius = 0.5 * (edges[1:] + edges[:-1])
+        return radius[ring], angle, DENSITY * (rings / counts)[ring]
+
+
+def _rms(values: np.ndarray) -> float:
+    return float(np.sqrt(np.mean(values**2)))

@@ -1,0 +1,122 @@
+"""A handful of particles given one by one: hard geometry, of which only bounds are known."""
+
+from typing import Annotated, Any, ClassVar, Literal
+
+import numpy as np
+from pydantic import Field, model_validator
+
+from sph.problems import base
+
+_SHARED = base.Problem.model_fields
+
+PER_PARTICLE = ("velocities", "masses", "internal_energies")
+
+
+class Problem(base.Problem):
+    """Particles at positions given in the configuration."""
+
+    defaults: ClassVar = {
+        "physics.gamma": 5.0 / 3.0,
+        "physics.alpha": 1.0,
+        "time.end": 1.0,
+        "output.interval": 0.5,
+    }
+    limits: ClassVar = {
+        "energy_drift": base.Limit(1e-3, "what a leapfrog may lose on any gas"),
+        "momentum_change": base.Limit(1e-12, "pairs push one another equally: round-off"),
+    }
+
+    name: Literal["particles"] = "particles"
+    dimension: Annotated[int, _SHARED["dimension"]] = 1
+    n: int = Field(
+        default=4, ge=1, description="number of positions, from which it follows if not given"
+    )
+    domain: Annotated[list[float] | list[list[float]], _SHARED["domain"]] = Field(
+        default=[-1.0, 1.0]
+    )
+    boundary: Annotated[base.Boundary | list[base.Boundary], _SHARED["boundary"]] = "open"
+    positions: list[list[float]] = Field(
+        default=[[-0.3], [-0.1], [0.1], [0.3]],
+        min_length=1,
+        description="one list of coordinates a particle",
+    )
+    velocities: list[list[float]] | None = Field(
+        default=None, description="one list of components a particle; at rest if not given"
+    )
+    masses: float | list[float] = Field(
+        default=1.0, description="one mass for all, or a list with one a particle"
+    )
+    internal_energies: float | list[float] = Field(
+        default=1.0,
+        description="internal energy per mass: one for all, or a list with one a particle",
+    )
+
+    @model_validator(mode="before")
+    @classmethod
+    def _number_of_positions(cls, keys: Any) -> Any:
+        positions = keys.get("positions") if isinstance(keys, dict) else None
+        return {"n": len(positions)} | keys if isinstance(positions, list) else keys
+
+    @model_validator(mode="after")
+    def _fits(self):
+        n = len(self.positions)
+        if self.n != n:
+            raise ValueError(f"n = {self.n}: expected the number of positions, {n}, or nothing")
+        for name in ("positions", "velocities"):
+            for row in getattr(self, name) or ():
+                if len(row) != self.dimension:
+                    raise ValueError(f"{name}: {row} has not {self.dimension} components")
+        for name in PER_PARTICLE:
+            given = getattr(self, name)
+            if isinstance(given, list) and len(given) != n:
+                raise ValueError(f"{name}: {len(given)} of them, expected {n}")
+        for name in ("masses", "internal_energies"):
+            if not np.all(np.array(getattr(self, name)) > 0.0):
+                raise ValueError(f"{name}: {getattr(self, name)}: expected above 0")
+        return self
+
+    @model_validator(mode="after")
+    def _in_the_box(self):
+        if len(np.shape(self.domain)) == 2 and len(self.domain) != self.dimension:
+            return self  # which the configuration says of every problem
+        for axis, boundary in enumerate(self.boundaries[: self.dimension]):
+            low, high = self.box[axis]
+            for row in self.positions:
+                if boundary != "open" and not low <= row[axis] <= high:
+                    raise ValueError(
+                        f"positions: {row} is outside [{low}, {high}] along {'xyz'[axis]}"
+                    )
+        return self
+
+    def initial(self, eos) -> base.InitialState:
+        """The particles as they were given."""
+        position = np.array(self.positions, dtype=float).T
+        still = self.velocities is None
+        velocity = np.zeros_like(position) if still else np.array(self.velocities, dtype=float).T
+        each = np.ones(position.shape[1])
+        return base.InitialState(
+            position,
+            velocity,
+            each * np.array(self.masses, dtype=float),
+            each * np.array(self.internal_energies, dtype=float),
+        )
+
+    def report(self, eos, time: float, particles, pressure) -> dict[str, float]:
+        """Bounds: energies above zero; and, where all is open, the centre of mass in free motion.
+
+        centre_error: its distance from where it must be, over what the fastest particle travels
+        and the extent of all particles.
+        """
+        figures = {
+            "lowest_internal_energy": float(particles.internal_energy.min()),
+            "lowest_density": float(particles.density.min()),
+            "widest_support": float(particles.support.max()),
+        }
+        if set(self.boundaries) == {"open"}:
+            start = self.initial(eos)
+            share = start.mass / start.mass.sum()
+            expected = start.position @ share + time * (start.velocity @ share)
+            found = particles.position @ (particles.mass / particles.mass.sum())
+            extent = np.abs(particles.position).max() + time * np.abs(particles.velocity).max()
+            figures["centre_error"] = float(np.abs(found - expected).max() / extent)
+        return figures
