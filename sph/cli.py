@@ -74,11 +74,11 @@ def restart(source, overrides, threads, directory):
 
     In the same directory later checkpoints are replaced.
     """
-    from sph import progress, runner
+    from sph import progress, restarting
     from sph.analysis import summary
 
     overrides = _with_threads(overrides, threads)
-    result, target = runner.restart(source, overrides, directory, progress.suited())
+    result, target = restarting.restart(source, overrides, directory, progress.suited())
     click.echo(summary.in_words(result))
     click.echo(f"Results: {target.path} (`sph plot {target.path}` draws them).")
 

@@ -71,7 +71,8 @@ class Domain:
                 raise NumericalError(
                     f"particle {particle} needs a kernel support of {reach:.4g}, wider than the "
                     f"{boundary} box along {'xyz'[axis]} ({hi - lo:.4g}).\n"
-                    "Try: more particles, a smaller physics.eta, or a wider domain along that axis."
+                    "Try: more particles, a smaller physics.eta, or a domain wider along it.",
+                    particle,
                 )
 
 

@@ -200,7 +200,9 @@ def test_restart_says_that_it_passes_over_a_damaged_checkpoint(done, tmp_path):
 @pytest.mark.parametrize("path", sorted(CONFIGS.glob("*.toml")), ids=lambda path: path.stem)
 def test_shipped_configurations_are_valid(path):
     resolved = configuration.load(path)
-    assert path.stem.startswith(resolved.problem.name) or resolved.problem.name == "shock_tube"
+    # tubes and boxes are of many kinds, each with its own name
+    many = resolved.problem.name in ("shock_tube", "uniform")
+    assert many or path.stem.startswith(resolved.problem.name)
     assert configuration.from_text(resolved.to_toml()) == resolved
 
 
@@ -318,7 +320,7 @@ def test_numerical_failure(config, tmp_path):
         "run", config, "-o", run, "--set", "physics.C=50.0", "--set", "problem.left.pressure=1e3"
     )
     first = run / "checkpoints" / "checkpoint_000000.h5"
-    assert_told(result, 3, "of particle ", "Try: ", f"`sph restart {first} --set ")
+    assert_told(result, 3, "particle ", "offenders.h5", "Try: ", f"`sph restart {first} --set ")
     assert json.loads((run / "summary.json").read_text())["status"] == "failed"
     result = sph_("restart", first, "--set", "physics.C=0.15", "--set", "time.end=0.01")
     assert result.exit_code == 0, result.output

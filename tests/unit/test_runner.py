@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from sph import config as configuration
-from sph import runner
+from sph import restarting, runner
 from sph.analysis.summary import in_words
 from sph.errors import ConfigError, FileError, NumericalError, Stopped
 from sph.output import checkpoint as checkpoints
@@ -132,7 +132,7 @@ def start(text, directory, progress=None):
 
 
 def go_on(source, *overrides, into=None, progress=None):
-    return runner.restart(source, overrides, into, progress or Watch())[1]
+    return restarting.restart(source, overrides, into, progress or Watch())[1]
 
 
 def copy(run, directory):
