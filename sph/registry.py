@@ -11,7 +11,7 @@ def names(package: str) -> list[str]:
     Files whose name begins with an underscore or is "base" are shared parts, not choices.
     """
     path = importlib.import_module(package).__path__
-    found = (module.name for module in pkgutil.iter_modules(path))
+    found = (module.name for module in pkgutil.iter_modules(path) if not module.ispkg)
     return sorted(name for name in found if not name.startswith("_") and name != "base")
 
 

@@ -60,6 +60,11 @@ class Scene:
         return self.config.physics.heating_model()
 
     @property
+    def finds_contacts(self) -> bool:
+        """Whether conductivity is switched by the Laplacian of the energy."""
+        return self.conducts and self.models.conductivity.switched
+
+    @property
     def sums_pressure(self) -> bool:
         return schemes.sums_pressure(self.models.scheme)
 
@@ -125,6 +130,7 @@ class Scene:
         part(self.finds_shocks, "gradients of velocity", "no switch asks for them")
         part(self.sums_pressure, "sum of the pressure", f"{physics.scheme} takes it from density")
         part(self.conducts, "artificial conductivity", "physics.conductivity is not given")
+        part(self.finds_contacts, "switch of conductivity", "no conductivity asks for it")
         part(self.external is not None, "external field", "physics.external is not given")
         part(self.heating is not None, "heating", "physics.heating is not given")
         part(physics.balsara, "Balsara factor", "physics.balsara = false")

@@ -9,7 +9,7 @@ from sph.integrators import leapfrog, step_size
 from sph.neighbours.order import BLOCK, number_of_blocks
 from sph.neighbours.search import Origin, Search, first_guess
 from sph.particles import Particles
-from sph.passes import density, rates, shocks
+from sph.passes import contacts, density, rates, shocks
 from sph.scene import Scene
 from sph.threads import Team
 from sph.watchdog import Watchdog, fault
@@ -69,6 +69,7 @@ class Simulation:
         self._sound_speed = np.empty(n)
         self._signal_speed = np.empty(n)
         self._wanted = np.empty(blocks)
+        self._shares = np.empty(n) if scene.finds_contacts else None
         self._div_v = np.empty(n) if scene.needs_divergence else None
         self._curl_v = np.empty(n) if scene.needs_curl else None
         self._balsara = np.empty(n) if scene.config.physics.balsara else None
@@ -240,16 +241,26 @@ class Simulation:
                 self._gas(), p.alpha, self._fields(p.support), self._div_v, p.acceleration, dt,
             )  # fmt: skip
 
+    def _find_contacts(self, models) -> None:
+        """What part of the conductivity acts on each particle."""
+        with self.clock.phase("conductivity"):
+            self.team.run(
+                contacts.contacts, self._wanted.size, self._dim, models, self._neighbours(),
+                self._gas(), self._shares, self._fields(self.particles.support),
+            )  # fmt: skip
+
     def _rates(self, models) -> None:
         """Step 5: acceleration, rate of energy, and each particle's signal speed."""
         p = self.particles
+        if self._shares is not None:
+            self._find_contacts(models)
         with self.clock.phase("rates"):
             self.team.run(
                 rates.rates, self._wanted.size, self._dim, models, self._neighbours(),
                 self._gas(), p.alpha if self.scene.finds_shocks else self._alpha,
                 self._fields(p.support), self._summed(),
-                self._balsara, self._energy if self.scene.conducts else None, p.acceleration,
-                p.energy_rate, self._signal_speed,
+                self._balsara, self._energy if self.scene.conducts else None, self._shares,
+                p.acceleration, p.energy_rate, self._signal_speed,
             )  # fmt: skip
             if self.scene.external is not None:
                 p.acceleration += self.scene.external.acceleration(p.position)

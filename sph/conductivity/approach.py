@@ -7,9 +7,10 @@ from typing import NamedTuple
 
 
 class Approach(NamedTuple):
-    """`strength`: 1 exchanges heat as fast as the pair approaches."""
+    """`strength`: 1 exchanges heat as fast as the pair approaches. `switched`: at contacts only."""
 
     strength: float = 1.0
+    switched: bool = False
 
     def exchange_speed(self, pressure_i, pressure_j, density_i, density_j, w_ij):
         return -self.strength * w_ij

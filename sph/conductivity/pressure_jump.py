@@ -10,9 +10,10 @@ import numpy as np
 
 
 class PressureJump(NamedTuple):
-    """`strength`: 1 is the value of the paper."""
+    """`strength`: 1 is the value of the paper. `switched`: at contacts only."""
 
     strength: float = 1.0
+    switched: bool = False
 
     def exchange_speed(self, pressure_i, pressure_j, density_i, density_j, w_ij):
         rho_ij = 0.5 * (density_i + density_j)

@@ -80,8 +80,9 @@ class Physics(Section):
     )
     conductivity: Annotated[Any, ModelChoice("sph.conductivity")] | None = Field(
         None,
-        description="artificial conductivity, which smooths contacts; none if not given",
-        examples=[{"name": "pressure_jump", "strength": 1.0}],
+        description="artificial conductivity, which smooths contacts, at these only if switched; "
+        "none if not given",
+        examples=[{"name": "pressure_jump", "strength": 1.0, "switched": True}],
     )
     external: Annotated[Any, ModelChoice("sph.external")] | None = Field(
         None,

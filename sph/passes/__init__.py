@@ -8,7 +8,8 @@ depend on the number of threads.
 
 Arguments that are None leave their part out of the compiled code: div_v (nothing needs the
 divergence), curl_v (1-D, or no Balsara factor), f (no Balsara factor), alpha (one constant),
-conducted (no conductivity), summed (the scheme takes its pressure from the equation of state).
+conducted (no conductivity), shares (no switch for it), summed (the scheme takes its pressure from
+the equation of state).
 """
 
 from typing import NamedTuple

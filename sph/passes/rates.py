@@ -18,7 +18,7 @@ TINY = 1e-300  # keeps 1/r finite where r_ij = 0 and the vector it multiplies is
 @njit(**COMPILED)
 def rates(
     first_block, last_block, dim, models, neighbours, gas, alpha, fields, summed, f, conducted,
-    acceleration, energy_rate, signal_speed,
+    shares, acceleration, energy_rate, signal_speed,
 ):  # fmt: skip
     """Rate pass over blocks [first_block, last_block): eqs 22-26.
 
@@ -48,6 +48,7 @@ def rates(
     fs = np.empty(size if f is not None else 0)
     us = np.empty(size if conducted is not None or summed is not None else 0)
     Ps = np.empty(size if conducted is not None or summed is not None else 0)
+    half_shares = np.empty(size if shares is not None else 0)
     shifts = np.empty(size if summed is not None else 0)
     force = np.empty(size)
     for block in range(first_block, last_block):
@@ -72,6 +73,8 @@ def rates(
             if conducted is not None:
                 us[k] = conducted[j]
                 Ps[k] = pressure(eos, density[j], conducted[j])
+            if shares is not None:
+                half_shares[k] = 0.5 * shares[j]
             if summed is not None:
                 us[k] = energy[j]
                 Ps[k] = summed.pressure[j]
@@ -118,6 +121,8 @@ def rates(
                     speed = exchange_speed(conductivity, P_i, Ps[k], rho_i, rho[k], w_ij)
                     # Price (2008) eq 27: over rho_ij = (rho_i + rho_j)/2; slope r is m_j dW/dr
                     exchange = speed * (conducted[i] - us[k]) * 2.0 * (inverse * r)
+                    if shares is not None:
+                        exchange *= 0.5 * shares[i] + half_shares[k]
                     heating += (slope_i + slope_j) * r * exchange
                 fastest = larger(fastest, v_sig if slope_i + slope_j < 0.0 else 0.0)
             energy_rate[i] = heating

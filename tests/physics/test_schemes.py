@@ -23,7 +23,8 @@ def load(stem, *overrides):
 @pytest.mark.parametrize(
     "override",
     [f"scheme='{name}'" for name in SCHEMES]
-    + [f"conductivity='{name}'" for name in CONDUCTIVITIES],
+    + [f"conductivity='{name}'" for name in CONDUCTIVITIES]
+    + [f"conductivity={{name='{name}', switched=true}}" for name in CONDUCTIVITIES],
 )
 def test_all_keep_energy_and_find_the_tube(override):
     outcome = simulate(load("sod", "problem.n=100", f"physics.{override}"))
@@ -56,6 +57,19 @@ def test_variational_scheme_keeps_entropy():
     # the averaged gradient loses 2e-5 at any C, 65 times as much as the other at C = 0.02
     assert grad_h[1] > 0.8 * grad_h[0]
     assert variational[1] < grad_h[1] / 30
+
+
+def test_switched_conductivity_smooths_the_contact_and_spares_the_rest():
+    def tube(*overrides):
+        outcome = simulate(load("sod", "problem.n=200", *overrides))
+        return outcome.l1("density"), outcome.particles.internal_energy.max()
+
+    model = "physics.conductivity={{name='pressure_jump',switched={}}}"
+    none, fixed, switched = tube(), tube(model.format("false")), tube(model.format("true"))
+    # u behind the shock is 2.853 in the exact solution; 2.986 is seen without conductivity, 2.896
+    # and 2.963 with it. The error of the density is .00890, .01018 and .00911: a sixth of the price
+    assert fixed[1] < switched[1] < none[1] - 0.01
+    assert switched[0] - none[0] < (fixed[0] - none[0]) / 3
 
 
 def test_pressure_energy_leaves_a_contact_at_rest():

@@ -93,6 +93,7 @@ class Scene:
     alpha: float | dict[str, float] = 1.0
     scheme: str = "grad_h"  # or "variational" or "pressure_energy"
     conductivity: tuple[str, float] | None = None  # ("pressure_jump" or "approach", strength)
+    switched_conductivity: bool = False  # where u is not linear, after Price & Monaghan (2005)
     kernel: str = "wendland_c2"
     flattened: bool = False  # the cubic spline's flattened gradient, in eqs 22-23 only
     balsara: bool = True
@@ -423,7 +424,36 @@ def _viscosity(pairs, alpha, state, w_ij, v_sig):
     return term * 0.5 * (f[i] + f[j])
 
 
-def _conduction(scene, pairs, mass, energy, state, w_ij, mean_dW):
+def conducting_share(scene, pairs, mass, velocity, energy, state):
+    """(N,) h^2 |lap u| / (v_sig sqrt(u)), at most 1: the balance of Price & Monaghan's (2005)
+    source S = 0.1 h |lap u| / sqrt(u) with decay in h / (0.1 v_sig); and its scale."""
+    n, i, j, H = len(mass), pairs.i, pairs.j, state["support"]
+    # where particles meet (dW/dr)/r is the slope's own: every kernel is a polynomial below q = 0.3
+    slope = np.polynomial.Chebyshev.interpolate(
+        lambda q: KERNELS[scene.kernel](q, scene.dimension)[1], 12, domain=[0, 0.3]
+    )
+    meeting = slope.deriv()(0.0) * H[i] ** -(scene.dimension + 2.0)
+    apart = pairs.r > 0
+    F = np.where(apart, scene.kernel_at(pairs.r, H[i])[1] / np.where(apart, pairs.r, 1.0), meeting)
+    terms = 2 * mass[j] / state["density"][j] * (energy[i] - energy[j]) * F
+    factor = (H / scene.h_ratio) ** 2 / (
+        _fastest_approach(pairs, velocity, state) * np.sqrt(energy)
+    )
+    scale = factor * pairs.sum(abs(terms), n)
+    return np.minimum(factor * abs(pairs.sum(terms, n)), 1.0), scale
+
+
+def _fastest_approach(pairs, velocity, state):
+    """(N,) largest (c_i + c_j)/2 - min(0, v_ij.e_ij) in the support, Cullen & Dehnen's eq 15."""
+    i, j, sound = pairs.i, pairs.j, state["sound_speed"]
+    within = pairs.r < state["support"][i]
+    closing = np.minimum((pairs.difference(velocity) * pairs.unit).sum(axis=0), 0.0)
+    fastest = sound.copy()
+    np.maximum.at(fastest, i[within], (0.5 * (sound[i] + sound[j]) - closing)[within])
+    return fastest
+
+
+def _conduction(scene, pairs, mass, velocity, energy, state, w_ij, mean_dW):
     """(P,) rate of energy of Price (2008), eq 27: sum m_j/rho_ij v_sig (u_i - u_j) e_ij.grad W."""
     if scene.conductivity is None:
         return np.zeros(len(w_ij))
@@ -431,6 +461,9 @@ def _conduction(scene, pairs, mass, energy, state, w_ij, mean_dW):
     i, j, P, rho = pairs.i, pairs.j, state["pressure"], state["density"]
     rho_ij = 0.5 * (rho[i] + rho[j])
     speed = {"approach": abs(w_ij), "pressure_jump": np.sqrt(abs(P[i] - P[j]) / rho_ij)}[name]
+    if scene.switched_conductivity:
+        share = conducting_share(scene, pairs, mass, velocity, energy, state)[0]
+        strength = strength * 0.5 * (share[i] + share[j])
     return strength * speed * mass[j] / rho_ij * (energy[i] - energy[j]) * mean_dW
 
 
@@ -445,7 +478,7 @@ def _forces(scene, pairs, mass, velocity, energy, alpha, state):
     pressure = PRESSURES[scene.scheme](scene, pairs, mass, energy, state, along, radial)
     mean_dW = 0.5 * (along[0] + along[1])
     viscous = _viscosity(pairs, alpha, state, w_ij, v_sig) * mass[j] * mean_dW
-    conducted = _conduction(scene, pairs, mass, energy, state, w_ij, mean_dW)
+    conducted = _conduction(scene, pairs, mass, velocity, energy, state, w_ij, mean_dW)
     push = pressure.push - viscous  # eq 22
     work = pressure.work + 0.5 * viscous * radial  # eq 23
     fastest = np.zeros(n)
@@ -493,11 +526,7 @@ def _gradient(scene, pairs, mass, support, field):
 def shock_alpha(scene, pairs, mass, velocity, acceleration, alpha, dt, state):
     """(N,) alpha after dt by Cullen & Dehnen (2010), their eqs 13-18; h there is H here."""
     n, i, j, H = len(mass), pairs.i, pairs.j, state["support"]
-    within = pairs.r < H[i]
-    closing = np.minimum((pairs.difference(velocity) * pairs.unit).sum(axis=0), 0.0)
-    sound = state["sound_speed"]
-    v_sig = sound.copy()
-    np.maximum.at(v_sig, i[within], (0.5 * (sound[i] + sound[j]) - closing)[within])  # eq 15
+    v_sig = _fastest_approach(pairs, velocity, state)  # eq 15
     L = _gradient(scene, pairs, mass, H, velocity)
     divergence = np.trace(L, axis1=1, axis2=2)
     rate = np.trace(_gradient(scene, pairs, mass, H, acceleration), axis1=1, axis2=2)

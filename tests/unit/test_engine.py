@@ -17,7 +17,7 @@ from sph.domain import Domain
 from sph.eos import ideal_gas
 from sph.neighbours import order as ordering
 from sph.neighbours.search import Origin, Search
-from sph.passes import density, rates, shocks
+from sph.passes import contacts, density, rates, shocks
 from sph.passes.smoothing import Converged, FixedPasses
 from sph.problems import base
 from sph.scene import Scene
@@ -55,11 +55,13 @@ class Case:
     flattened: bool = False
     scheme: str = "grad_h"
     conductivity: tuple[str, float] | None = None
+    switched_conductivity: bool = False
 
     def __str__(self):
         parts = [f"{len(self.boundaries)}d", *self.boundaries, self.kernel, str(self.passes)]
         parts += [self.scheme] * (self.scheme != "grad_h")
         parts += [self.conductivity[0]] if self.conductivity else []
+        parts += ["at contacts"] * self.switched_conductivity
         parts += ["switched"] * self.evolves + ["shocks"] * self.finds_shocks
         parts += ["balsara"] * self.balsara
         return "-".join(parts + ["flattened"] * self.flattened)
@@ -94,6 +96,7 @@ class Case:
             alpha=self.alpha,
             scheme=self.scheme,
             conductivity=self.conductivity,
+            switched_conductivity=self.switched_conductivity,
             kernel=self.kernel,
             flattened=self.flattened,
             balsara=self.balsara,
@@ -105,7 +108,7 @@ class Case:
         if self.conductivity is None:
             return None
         name, strength = self.conductivity
-        return registry.model_class("sph.conductivity", name)(strength)
+        return registry.model_class("sph.conductivity", name)(strength, self.switched_conductivity)
 
     @property
     def viscosity(self):
@@ -162,8 +165,19 @@ CASES = [
     Case((MIRROR, PERIODIC), W, "converged", SWITCHED, scheme="pressure_energy", conductivity=JUMP),
     Case((PERIODIC, OPEN, MIRROR), W, 2, scheme="pressure_energy", conductivity=APPROACH),
     Case((MIRROR,), W, 2, alpha=SHOCKS, balsara=False),
+    Case((OPEN,), W, 2, conductivity=JUMP, switched_conductivity=True),
     Case((OPEN, MIRROR), W, "converged", alpha=SHOCKS, scheme="variational"),
+    Case((MIRROR, PERIODIC), S, 2, conductivity=APPROACH, switched_conductivity=True),
     Case((PERIODIC, MIRROR, OPEN), "wendland_c4", 2, alpha=SHOCKS, balsara=False),
+    Case(
+        (PERIODIC, OPEN, MIRROR),
+        W,
+        2,
+        conductivity=JUMP,
+        switched_conductivity=True,
+        scheme="pressure_energy",
+        alpha=SHOCKS,
+    ),
 ]
 
 
@@ -276,12 +290,15 @@ def run_engine(case, gas, skin, threads):
         pass_over(
             shocks.shocks, team, case, gas, search, alpha, fields, div_v, gas.acceleration, STEP
         )
+    shares = np.full(count, np.nan) if case.switched_conductivity else None
+    if shares is not None:
+        pass_over(contacts.contacts, team, case, gas, search, shares, fields)
     acceleration = np.full(gas.position.shape, np.nan)
     energy_rate, signal_speed = np.full((2, count), np.nan)
     conducted = gas.energy if case.conductivity else None
     pass_over(
-        rates.rates, team, case, gas, search, alpha, fields, summed, f, conducted, acceleration,
-        energy_rate, signal_speed,
+        rates.rates, team, case, gas, search, alpha, fields, summed, f, conducted, shares,
+        acceleration, energy_rate, signal_speed,
     )  # fmt: skip
     team.close()
     found = fields._asdict()
@@ -391,7 +408,8 @@ def simulate(case, gas, end, threads=1):
     name, strength = case.conductivity or (None, None)
     physics = config.Physics(
         gamma=1.4, alpha=alpha, eta=case.eta, density_passes=case.passes, scheme=case.scheme,
-        conductivity=name and {"name": name, "strength": strength},
+        conductivity=name
+        and {"name": name, "strength": strength, "switched": case.switched_conductivity},
     )  # fmt: skip
     whole = config.Config(
         problem, physics, config.Time(end=end), config.Output(interval=end), config.Run()
@@ -413,6 +431,7 @@ TRAJECTORIES = [
     (Case((PERIODIC, MIRROR), W, 2, alpha=SWITCHED), (11, 11), 0.1),
     (Case((PERIODIC,), W, 2, scheme="pressure_energy", conductivity=JUMP), (70,), 0.05),
     (Case((PERIODIC, MIRROR), W, 2, alpha=SHOCKS), (11, 11), 0.1),
+    (Case((MIRROR,), W, 2, conductivity=JUMP, switched_conductivity=True), (70,), 0.05),
 ]
 
 

@@ -1,10 +1,10 @@
-"""Equations of state and viscosities: each formula by hand, and the same in compiled code."""
+"""Equations of state, viscosities, conductivity: formulas by hand, and in compiled code."""
 
 import numpy as np
 import pytest
 from numba import njit
 
-from sph import eos, registry, viscosity
+from sph import conductivity, eos, registry, viscosity
 from sph.compiled import COMPILED
 from sph.viscosity import balsara, constant
 from sph.viscosity.switches import cullen_dehnen, morris_monaghan
@@ -111,6 +111,20 @@ def test_balsara_tells_compression_from_shear():
         [1 / 1.002, 1 / 4.002, 0, 1 / 1.002],
         rtol=FEW_ROUNDINGS,
     )
+
+
+@njit(**COMPILED)
+def _shares(h, laplacian, energy, signal_speed):
+    return conductivity.share(h, laplacian, energy, signal_speed)
+
+
+def test_conductivity_acts_where_the_energy_bends():
+    # by hand: h^2 |lap u| / (v_sig sqrt(u)) = 0.04 * 30 / (2 * 1.5), and all of it at most
+    for laplacian, expected in [(30.0, 0.4), (-30.0, 0.4), (0.0, 0.0), (300.0, 1.0)]:
+        assert _shares(0.2, laplacian, 2.25, 2.0) == pytest.approx(expected, rel=FEW_ROUNDINGS)
+    # cold gas: none where it is all cold, all beside what is hot
+    assert _shares(0.2, 0.0, 0.0, 0.0) == 0.0
+    assert _shares(0.2, 1.0, 0.0, 0.0) == 1.0
 
 
 @njit(**COMPILED)

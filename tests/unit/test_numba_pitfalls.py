@@ -243,7 +243,8 @@ def test_no_two_models_look_alike_to_the_dispatcher():
     once both are used in one process. Where this fails, give the new class a name of its own.
     """
     seen = {}
-    for package in ("sph.kernels", "sph.eos", "sph.viscosity", "sph.schemes"):
+    choices = ("kernels", "eos", "viscosity", "viscosity.switches", "conductivity", "schemes")
+    for package in (f"sph.{choice}" for choice in choices):
         for name in registry.names(package):
             look = registry.model_class(package, name).__name__
             assert look not in seen, f"{package}.{name} looks like {seen[look]}"

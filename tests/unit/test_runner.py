@@ -77,6 +77,7 @@ boundary = "mirror"
 [physics]
 C = 0.03
 alpha = { min = 0.05, max = 2.0, switch = "cullen_dehnen" }
+conductivity = { name = "pressure_jump", switched = true }
 [time]
 end = 0.032
 [output]
@@ -87,7 +88,7 @@ threads = 1
 SCENES = {
     "1-D mirror": TUBE,
     "2-D periodic, switched alpha": SHEAR,
-    "2-D mirror, alpha by shocks": SHOCKS,
+    "2-D mirror, alpha by shocks, switched conductivity": SHOCKS,
     "3-D open": CLOUD,
 }
 
