@@ -28,13 +28,14 @@ class Domain:
     box: np.ndarray
     boundaries: tuple[str, ...]
 
+    @property
+    def _axes(self):
+        return zip(self.box, self.boundaries, strict=True)
+
     @cached_property
     def images(self) -> Images:
         """The identity and every image that can reach into the box from one box length away."""
-        per_axis = [
-            _axis_images(lo, hi, boundary)
-            for (lo, hi), boundary in zip(self.box, self.boundaries, strict=True)
-        ]
+        per_axis = [_axis_images(lo, hi, boundary) for (lo, hi), boundary in self._axes]
         combined = list(product(*per_axis))
         sign = np.array([[one[0] for one in image] for image in combined])
         offset = np.array([[one[1] for one in image] for image in combined])
@@ -45,7 +46,7 @@ class Domain:
 
         position (D, N); velocities: arrays (D, N) whose component changes sign in a reflection.
         """
-        for axis, ((lo, hi), boundary) in enumerate(zip(self.box, self.boundaries, strict=True)):
+        for axis, ((lo, hi), boundary) in enumerate(self._axes):
             x = position[axis]
             outside = np.flatnonzero((x < lo) | (x >= hi))
             if boundary == "open" or outside.size == 0:
@@ -61,12 +62,18 @@ class Domain:
                 for velocity in velocities:
                     velocity[axis, beyond[turned]] *= -1
 
+    @cached_property
+    def longest_reach(self) -> float:
+        """The widest support that the images serve: infinite where every axis is open."""
+        closed = [hi - lo for (lo, hi), kind in self._axes if kind != "open"]
+        return float(min(closed, default=np.inf))
+
     def check_reach(self, reach: float, particle: int) -> None:
         """Raise NumericalError where a kernel's support is wider than the box.
 
         Each boundary has one image on either side, which serves supports up to one box length.
         """
-        for axis, ((lo, hi), boundary) in enumerate(zip(self.box, self.boundaries, strict=True)):
+        for axis, ((lo, hi), boundary) in enumerate(self._axes):
             if boundary != "open" and reach > hi - lo:
                 raise NumericalError(
                     f"particle {particle} needs a kernel support of {reach:.4g}, wider than the "

@@ -7,7 +7,7 @@ from sph import passes, totals
 from sph.clock import Clock
 from sph.integrators import leapfrog, step_size
 from sph.neighbours.order import BLOCK, number_of_blocks
-from sph.neighbours.search import Origin, Search, first_guess
+from sph.neighbours.search import Origin, Search
 from sph.particles import Particles
 from sph.passes import contacts, density, rates, shocks
 from sph.scene import Scene
@@ -175,7 +175,7 @@ class Simulation:
         with self.clock.phase("lists"):
             if guess:
                 models = self.scene.models
-                p.support = first_guess(p.position, models.support_ratio * models.eta)
+                p.support = self.search.guess(p.position, models.support_ratio * models.eta)
             skin = self.search.skin_for(self._velocity, p.support, dt)
             self.search.build(Origin(p.position.copy(), p.support.copy(), skin), p.id)
 

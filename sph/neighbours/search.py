@@ -17,6 +17,10 @@ GROWTH = 0.03
 # (0.2 + 1.4) / (0.93 + 0.85) microseconds a particle.
 BUILD_OVER_PASSES = 0.9
 
+# A support asks for lists a quarter wider than itself. Where that is not enough so often in one
+# step, the guess was off by orders of magnitude (particles at one place): they get twice as much.
+PATIENCE = 4
+
 
 class Origin(NamedTuple):
     """What the lists were built from: enough, with the memory order, to build them again."""
@@ -77,6 +81,7 @@ class Search:
         self.lists = None
         self._room = None
         self.reach_factor = 0.0  # of the list support: within it candidates are complete
+        self._widenings = 0  # of this step
 
     def stale(self, position, support) -> bool:
         """Whether particles have moved so far that the lists may miss a neighbour.
@@ -84,6 +89,7 @@ class Search:
         A pair is listed if it was within (1 + skin) of the larger support; each of the two may have
         moved since. Keeps `reach_factor` for the passes.
         """
+        self._widenings = 0
         if self.lists is None:
             return True
         moved, grown = _motion(position, support, self.origin.position, self.origin.support)
@@ -93,6 +99,12 @@ class Search:
     def skin_for(self, velocity, support, dt: float) -> float:
         """The skin for lists built now, for particles of velocity (D, N) and a step dt."""
         return best_skin(_largest_step(velocity, support, dt), velocity.shape[0])
+
+    def guess(self, position, ratio: float) -> np.ndarray:
+        """Supports (N,) to begin with, none so wide that lists cannot serve it."""
+        return np.minimum(
+            first_guess(position, ratio), self.domain.longest_reach / (1 + 2 * GROWTH)
+        )
 
     def order(self, position, identity) -> np.ndarray:
         """The block order of these particles, (N,) indices."""
@@ -118,8 +130,12 @@ class Search:
 
     def widen(self, position, wanted, identity) -> None:
         """List particles where they are now, to `wanted` (blocks,) times the list support."""
+        self._widenings += 1
         factor = np.repeat(np.maximum(wanted, 1.0), BLOCK)[: identity.size]
         support = self.origin.support * factor
+        if self._widenings > PATIENCE:
+            room = self.domain.longest_reach / (1 + self.origin.skin)
+            support = np.where(factor > 1.0, np.clip(2.0 * support, support, room), support)
         self.build(Origin(position.copy(), support, self.origin.skin), identity)
 
 

@@ -79,3 +79,9 @@ def test_mirrors_turn_a_fast_particle_as_often_as_it_meets_them():
     Domain(BOX[:1], ("mirror",)).bring_inside(position, [velocity])
     np.testing.assert_array_equal(position[0], [0.75, -0.25, -0.75, -0.25, -0.75, 0.75, 0.75, 0.25])
     np.testing.assert_array_equal(velocity[0], [-1, -1, 1, 1, 1, 1, -1, 1])
+
+
+def test_longest_reach_is_the_narrowest_closed_axis():
+    assert Domain(BOX, ("periodic", "open", "mirror")).longest_reach == 2.0
+    assert Domain(BOX, ("periodic", "mirror", "open")).longest_reach == 0.5
+    assert Domain(BOX, ("open",) * 3).longest_reach == np.inf
