@@ -8,6 +8,9 @@ from pydantic import ValidationError
 from scipy.spatial import cKDTree
 
 from sph import eos
+from sph.exact import riemann
+from sph.problems import blast_waves
+from sph.problems.blast_waves import Problem as BlastWaves
 from sph.problems.noh import Problem as Noh
 from sph.problems.shu_osher import Problem as ShuOsher
 from sph.problems.square import Problem as Square
@@ -246,7 +249,22 @@ def test_errors_are_taken_where_nothing_came_from_the_ends():
     # sound: 1.9365 behind, 1.3229 ahead: -12.5 + 1.8 x 4.566 and 5.5 - 1.8 x 1.3229
     assert mask.tolist() == [False, True, True, False]
     assert words == "-4.281 < x < 3.119"
-    assert ShuOsher().exact(AIR, 1.8, np.zeros((1, 1))) is None
+
+
+def test_reference_keeps_the_gas_behind_and_ahead_and_the_published_shock():
+    x = np.array([[-12.0, -4.5, -3.8, 0.9, 4.0]])
+    exact = ShuOsher().exact(AIR, 0.2, x)
+    # sound behind gets from -4 to -4 + 0.2 x 0.69, the shock to -4 + 0.2 x 3.55: nothing has
+    # happened at four of the points but that the gas flows
+    np.testing.assert_allclose(exact["density"][:2], 3.857143, rtol=1e-9)
+    np.testing.assert_allclose(
+        exact["velocity"][0, [0, 1, 3, 4]], [2.629369] * 2 + [0, 0], atol=1e-4
+    )
+    # linear between centres 0.0032 apart, of a sine with second derivative 5
+    assert exact["density"][3] == pytest.approx(1.0 + 0.2 * np.sin(4.5), abs=1e-4)
+    at_start = ShuOsher().exact(AIR, 0.0, x)
+    np.testing.assert_array_equal(at_start["pressure"], [10.33333] * 2 + [1.0] * 3)
+    assert ShuOsher().exact(SimpleNamespace(), 1.8, x) is None
 
 
 def test_report_measures_a_wave_behind_a_shock():
@@ -261,6 +279,54 @@ def test_report_measures_a_wave_behind_a_shock():
     assert report["peak_density"] == pytest.approx(4.5, rel=1e-5)
     nothing = SimpleNamespace(position=x[None], density=np.ones(x.size), mass=np.ones(x.size))
     assert problem.report(AIR, 1.8, nothing, None) == {}
+
+
+# --- blast waves ------------------------------------------------------------------------------
+
+
+def test_blasts_are_three_gases_in_a_closed_tube():
+    problem = BlastWaves()
+    state = problem.initial(AIR)
+    pressure = AIR.pressure(1.0, state.internal_energy)
+    counts = [(abs(pressure / P - 1.0) < 1e-12).sum() for P in (1000.0, 0.01, 100.0)]
+    assert counts == [40, 320, 40]
+    assert state.mass.sum() == pytest.approx(1.0, rel=1e-12)  # a sum of 400 terms
+    assert problem.boundaries == ("mirror",)
+
+
+def test_blasts_have_the_published_walls():
+    with pytest.raises(ValidationError, match=r"expected \[0, 1\]"):
+        BlastWaves(domain=[0.0, 2.0])
+
+
+def test_blasts_are_two_shock_tubes_until_they_meet_a_wall(monkeypatch):
+    monkeypatch.setattr(blast_waves, "CELLS", 1600)
+    blast_waves._reference.cache_clear()
+    x, time = np.linspace(0.02, 0.98, 2001), 0.002
+    exact = BlastWaves().exact(AIR, time, x[None])
+    blast_waves._reference.cache_clear()
+    cold = riemann.State(1.0, 0.0, 0.01)
+    left = riemann.solve(riemann.State(1.0, 0.0, 1000.0), cold, AIR, (x - 0.1) / time)
+    right = riemann.solve(cold, riemann.State(1.0, 0.0, 100.0), AIR, (x - 0.9) / time)
+    both = [np.where(x < 0.5, *pair) for pair in zip(left, right, strict=True)]
+    for found, expected in zip((exact["density"], exact["velocity"][0]), both[:2], strict=True):
+        # shocks a cell or two wide in a tube of 1600: 0.006 and 0.004 were measured
+        assert np.abs(found - expected).mean() < 0.01 * np.abs(expected).mean()
+
+
+def test_blasts_report_the_error_that_is_put_in(monkeypatch):
+    monkeypatch.setattr(blast_waves, "CELLS", 200)
+    problem, state = BlastWaves(), BlastWaves().initial(AIR)
+    blast_waves._reference.cache_clear()
+    exact = problem.exact(AIR, 0.01, state.position)
+    particles = SimpleNamespace(
+        position=state.position, density=0.9 * exact["density"], mass=state.mass
+    )
+    report = problem.report(AIR, 0.01, particles, None)
+    blast_waves._reference.cache_clear()
+    assert report["density_L1_relative"] == pytest.approx(0.1, rel=1e-12)
+    assert report["peak_density"] == pytest.approx(0.9 * exact["density"].max(), rel=1e-12)
+    assert problem.report(SimpleNamespace(), 0.01, particles, None) == {}
 
 
 def test_shock_starts_inside_the_domain():
