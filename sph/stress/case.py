@@ -48,15 +48,15 @@ class Bound(Section):
         return above and below and value == value
 
     def closeness(self, value: float) -> float:
-        """How near `value` is to the bound, 1 on it and more beyond; for positive bounds."""
+        """How near `value` is to the bound, 1 on it and more beyond."""
         if value != value:
             return float("inf")
-        shares = [0.0 if self.holds(value) else 1.0]
-        if self.at_most is not None and self.at_most > 0.0:
-            shares.append(value / self.at_most)
-        if self.at_least is not None and self.at_least > 0.0:
-            shares.append(self.at_least / value if value > 0.0 else float("inf"))
-        return max(shares)
+        low, high = self.at_least, self.at_most
+        if low is not None and high is not None:
+            return abs(2.0 * value - (high + low)) / (high - low)
+        size, bound = (high, value) if low is None else (value, low)
+        # a share means something where both are above zero
+        return bound / size if min(size, bound) > 0.0 else float(not self.holds(value))
 
     def __str__(self) -> str:
         low = "" if self.at_least is None else f"at least {self.at_least:g}"

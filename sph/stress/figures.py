@@ -72,7 +72,8 @@ class Figures:
         return self._said("errors", "fields", field, norm)
 
     def _of_history(self, column: str, kind: str):
-        return OF_HISTORY[kind](self._history[column])
+        values = self._history[column]
+        return np.mean(values == kind) if values.dtype == object else OF_HISTORY[kind](values)
 
     def _of_state(self, field: str, kind: str):
         return OF_STATE[kind](_length(_field(self._last, field)))

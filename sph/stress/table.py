@@ -65,7 +65,7 @@ def sentences(cases: Sequence[Case], results: Sequence[Result]) -> list[str]:
             values = [
                 f"{result.reaches[name]:.3g} ({result.setting})"
                 for result in _of(case.name, results)
-                if name in result.reaches and result.verdict == PASS
+                if result.verdict == PASS and not math.isnan(result.reaches[name])
             ]
             if values:
                 said.append(

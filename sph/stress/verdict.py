@@ -54,9 +54,17 @@ class Result:
 
     @property
     def worst(self) -> Check | None:
-        """The check nearest to its bound, or farthest beyond; those of every case have columns."""
+        """The check that is broken or nearest to it; those of every case have columns of their own.
+
+        An error that must stay below a bound goes before what a run must at least have.
+        """
         own = [check for check in self.checks if check.figure not in ALWAYS]
-        return max(own, key=lambda check: check.bound.closeness(check.value), default=None)
+        return max(own, key=_badness, default=None)
+
+
+def _badness(check: Check) -> tuple[bool, bool, float]:
+    is_error = check.bound.at_most is not None
+    return not check.holds, is_error, check.bound.closeness(check.value)
 
 
 def judge(case: Case, setting: str, task: Task) -> Result:
@@ -100,9 +108,10 @@ def _numbers(row: Row | None, figures: Figures) -> dict:
         "lowest_density": figures.value("history.min_density.min"),
         "steps": row.steps,
         "smallest_step": figures.value("history.dt.min"),
-        "cpu_seconds": row.cost["cpu"],
+        # the history of a run that failed ends before its last step, which may have compiled
+        "cpu_seconds": max(0.0, row.cost["cpu"]),
     }
 
 
 def _first_line(text: str) -> str:
-    return text.partition("\n")[0]
+    return text.partition("\n")[0].rstrip(".")

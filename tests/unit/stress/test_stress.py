@@ -149,7 +149,9 @@ def test_only_named_cases_run(stress):
     [
         (Bound(at_most=1.0, why="-"), 1.0, 1.1),
         (Bound(at_least=-1.0, why="-"), -1.0, -1.1),
-        (Bound(at_least=2.0, at_most=3.0, why="-"), 2.5, 1.9),
+        (Bound(at_least=0.5, why="-"), 0.6, -0.1),
+        (Bound(at_least=2.0, at_most=3.0, why="-"), 2.9, 1.9),
+        (Bound(at_least=-3.0, at_most=3.0, why="-"), -2.9, -3.1),
     ],
 )
 def test_bounds(bound, inside, outside):
