@@ -29,6 +29,7 @@ class Problem(base.Problem):
         "time.end": 5.0,
         "output.interval": 1.0,
     }
+    ideal_gas: ClassVar = True
     radial: ClassVar = True
     limits: ClassVar = {
         "energy_drift": base.Limit(

@@ -94,6 +94,26 @@ def test_exact_solution_at_the_start_is_the_initial_state(problem):
     )
 
 
+class OtherGas:
+    """The formulas of air, without saying that they are an ideal gas's."""
+
+    pressure, sound_speed, internal_energy = AIR.pressure, AIR.sound_speed, AIR.internal_energy
+
+
+@pytest.mark.parametrize("name", registry.names("sph.problems"))
+def test_a_problem_that_takes_any_gas_asks_nothing_but_its_formulas(name):
+    problem = registry.load("sph.problems", name).Problem()
+    if problem.ideal_gas:  # the configuration refuses others
+        return
+    state = problem.initial(OtherGas())
+    np.testing.assert_array_equal(state.internal_energy, problem.initial(AIR).internal_energy)
+    exact = problem.exact(OtherGas(), 0.0, state.position)
+    if exact is not None:
+        np.testing.assert_array_equal(
+            exact["internal_energy"], problem.exact(AIR, 0.0, state.position)["internal_energy"]
+        )
+
+
 @pytest.mark.parametrize("name", registry.names("sph.problems"))
 def test_module_imports_no_heavy_package(name):
     code = (

@@ -39,7 +39,9 @@ def test_pressure_energy_takes_an_ideal_gas_alone(tmp_path, monkeypatch):
             physics("pressure_energy", other)
 
 
-@pytest.mark.parametrize("problem", ["sound_wave", "gresho", "yee", "noh", "point_explosion"])
+@pytest.mark.parametrize(
+    "problem", ["sound_wave", "gresho", "yee", "noh", "point_explosion", "expanding_ball"]
+)
 def test_problems_solved_for_an_ideal_gas_refuse_another(problem):
     def read(p_inf):
         gas = f'{{ name = "stiffened_gas", gamma = 1.4, p_inf = {p_inf} }}'
