@@ -9,7 +9,7 @@ particles, and the history shows it. With the step limit u/|du/dt| it is never n
 import numpy as np
 from numba import njit
 
-from sph.compiled import COMPILED, INLINED
+from sph.compiled import COMPILED
 
 
 @njit(**COMPILED)
@@ -69,7 +69,7 @@ def correct_energy(dt, energy, rate, mass) -> float:
     return given
 
 
-@njit(**INLINED)
+@njit(**COMPILED, forceinline=True)
 def _kept_positive(energy, change):
     """(u + change kept positive, what that added)."""
     # in this order a number that is not one passes through, for the watchdog to find

@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 from numba import njit
 
-from sph.compiled import INLINED, verb
+from sph.compiled import COMPILED, verb
 from sph.kernels import dw_over_q, normalisation, w
 
 # The passes of eqs 7 and 15 approach their common root by a factor 1 - Omega each: where a flow is
@@ -70,7 +70,7 @@ class Converged(NamedTuple):
         return solve(kernel, dim, r, m, nc, mass, H, ratio, reach, self.tolerance)
 
 
-@njit(**INLINED)
+@njit(**COMPILED, forceinline=True)
 def solve(kernel, dim, r, m, nc, mass, H, ratio, reach, tolerance):
     """The root of eqs 7 and 15: Newton's iteration, safeguarded by bisection."""
     C = normalisation(kernel, dim)

@@ -98,6 +98,7 @@ class Scene:
     flattened: bool = False  # the cubic spline's flattened gradient, in eqs 22-23 only
     balsara: bool = True
     density_passes: int | str = 2  # or "converged"
+    unsettled: float = 0.05  # change of H in the last counted pass beyond which it is solved for
     energy_limit: bool = True
 
     @property
@@ -291,8 +292,8 @@ def _smoothing(scene, position, mass, guess):
             before = support
             rho, omega, omega_scale = _density(scene, position, mass, before)
             support = scene.h_ratio * scene.eta * (mass / rho) ** (1 / scene.dimension)  # eq 15
-        # no scheme of the paper's: where the last pass still moves H by 5 %, eq 15 is solved
-        unsettled = abs(support / before - 1) > 0.05
+        # not the paper's: where the passes do not settle, eqs 7 and 15 are solved together
+        unsettled = abs(support / before - 1) > scene.unsettled
         if unsettled.any():
             solved = _converged_support(scene, position, mass, guess)
             at_root = _density(scene, position, mass, solved)
