@@ -35,7 +35,7 @@ def particles_of(problem, gas, **fields):
 
 
 def test_ball_of_monatomic_gas_grows_as_the_closed_form():
-    # D (gamma - 1) = 2 in 3-D: R^2 = R_0^2 + (3 c^2 / (D (gamma - 1) / 2) ... ) t^2
+    # D (gamma - 1) = 2: then R^2 = R_0^2 + (final speed)^2 t^2
     for time in (0.1, 1.0, 30.0):
         radius, speed = expanding_ball.radius(time, 2.0, 0.7, 5.0 / 3.0, 3)
         final = 2.0 * 0.7 / (2.0 / 3.0) / np.sqrt(3.0)  # 2 c/(gamma - 1)/sqrt(D)
