@@ -8,6 +8,7 @@ from sph.config import Config
 from sph.domain import Domain
 from sph.passes import Models
 from sph.passes.smoothing import Converged, FixedPasses
+from sph.passes.weighting import ByMass, ByNumber
 from sph.viscosity import balsara
 
 # Relative tolerance of the converged support: round-off of the density sum is some 1e-14.
@@ -69,6 +70,11 @@ class Scene:
         return schemes.sums_pressure(self.models.scheme)
 
     @property
+    def bounds_acceleration(self) -> bool:
+        """Whether |a| bounds the step: a field, or heavy gas beside light, sends no signal."""
+        return self.external is not None or self.config.physics.density == "number"
+
+    @property
     def needs_curl(self) -> bool:
         return self.config.physics.balsara and self.dimension > 1
 
@@ -96,6 +102,7 @@ class Scene:
             scheme=schemes.make(physics.scheme),
             kernel=kernel,
             smoothing=smoothing,
+            weighting=ByNumber() if physics.density == "number" else ByMass(),
             eos=self.eos,
             viscosity=self.viscosity,
             conductivity=physics.conductivity_model(),
@@ -113,6 +120,7 @@ class Scene:
         inside = [
             f"{self.dimension}-D, {len(self.domain.images.sign)} image(s) of the box",
             f"scheme {physics.scheme}, kernel {name}{flattened}",
+            f"density by {physics.density}",
             f"equation of state {type(self.eos).__module__.rsplit('.', 1)[-1]}",
             "supports converged to 1e-10"
             if physics.density_passes == "converged"

@@ -53,7 +53,7 @@ class Simulation:
             particles.pressure = particles.pressure_by(scene.eos)
         physics = scene.config.physics
         self._bounds = step_size.Bounds(
-            physics.C, physics.energy_limit, scene.external is not None, scene.config.time.end
+            physics.C, physics.energy_limit, scene.bounds_acceleration, scene.config.time.end
         )
         if not scene.evolves_alpha or scene.finds_shocks:
             particles.alpha_rate = None

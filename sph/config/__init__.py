@@ -66,6 +66,11 @@ class Physics(Section):
     kernel: Annotated[Any, ModelChoice("sph.kernels")] = Field(
         "wendland_c2", description="smoothing kernel"
     )
+    density: Literal["mass", "number"] = Field(
+        "mass",
+        description='what a density sums: the "mass" of neighbours, or the "number" of them, which '
+        "the particle's own mass then multiplies: for masses that jump, the same where they do not",
+    )
     gamma: Gamma | None = Field(
         1.4, description="adiabatic index of an ideal gas, the ratio of specific heats"
     )

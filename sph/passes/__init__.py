@@ -23,6 +23,7 @@ class Models(NamedTuple):
     scheme: tuple
     kernel: tuple
     smoothing: tuple
+    weighting: tuple
     eos: tuple
     viscosity: tuple
     conductivity: tuple | None

@@ -9,6 +9,7 @@ from sph.kernels import dw_over_q, normalisation, w
 from sph.neighbours.lists import IMAGE_SHIFT
 from sph.neighbours.order import BLOCK
 from sph.passes.smoothing import find_support
+from sph.passes.weighting import mass_per_weight, weight
 from sph.schemes import summed_terms
 from sph.viscosity import alpha_rate, balsara_factor
 
@@ -25,7 +26,7 @@ def density(
     whose support was not found gets a density of -1.
     """
     D = len(dim)
-    scheme, kernel, smoothing, eos, viscosity, _, balsara, support_ratio, eta = models
+    scheme, kernel, smoothing, weighting, eos, viscosity, _, balsara, support_ratio, eta = models
     lists, images, list_support, reach_factor = neighbours
     start, count, candidates = lists
     sign, offset = images
@@ -48,7 +49,7 @@ def density(
             packed = candidates[start[block] + k]
             j = packed & ((1 << IMAGE_SHIFT) - 1)
             image = packed >> IMAGE_SHIFT
-            m[k] = mass[j]
+            m[k] = weight(weighting, mass[j])
             for d in range(D):
                 x[d, k] = sign[image, d] * position[d, j] + offset[image, d]
                 if div_v is not None:
@@ -63,9 +64,10 @@ def density(
                     squared += (position[d, i] - x[d, k]) ** 2
                 r[k] = np.sqrt(squared)
             H, rho_i, Omega_i, needed = find_support(
-                smoothing, kernel, dim, r, m, nc, mass[i], support_before[i],
+                smoothing, kernel, dim, r, m, nc, weight(weighting, mass[i]), support_before[i],
                 support_ratio * eta, reach_factor * list_support[i],
             )  # fmt: skip
+            rho_i *= mass_per_weight(weighting, mass[i])
             support[i], rho[i], Omega[i] = H, rho_i, Omega_i
             if needed > 0.0:
                 wanted[block] = max(wanted[block], needed / list_support[i])
@@ -89,6 +91,7 @@ def density(
             if div_v is not None:
                 H_inv = 1.0 / H
                 scale = -C * H_inv ** (D + 2) / (Omega_i * rho_i)
+                scale *= mass_per_weight(weighting, mass[i])  # over n_i, that is
                 total = curl_x = curl_y = curl_z = 0.0
                 for k in range(nc):
                     m_dw = m[k] * dw_over_q(kernel, dim, r[k] * H_inv)

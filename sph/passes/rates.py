@@ -9,6 +9,7 @@ from sph.eos import pressure
 from sph.kernels import force_over_q, normalisation
 from sph.neighbours.lists import IMAGE_SHIFT
 from sph.neighbours.order import BLOCK
+from sph.passes.weighting import by_share
 from sph.schemes import pair
 from sph.viscosity import pair_alpha
 
@@ -26,7 +27,7 @@ def rates(
     particle over its pairs and itself (eq 32).
     """
     D = len(dim)
-    scheme, kernel, _, eos, viscosity, conductivity, _, _, _ = models
+    scheme, kernel, _, weighting, eos, viscosity, conductivity, _, _, _ = models
     lists, images, _, _ = neighbours
     start, count, candidates = lists
     sign, offset = images
@@ -83,6 +84,7 @@ def rates(
             rho_i, P_term_i, c_i = density[i], pressure_term[i], sound_speeds[i]
             H_inv_i = 1.0 / support[i]
             gradient_i = 1.0 / support[i] ** (D + 2)
+            m_half_i = 0.5 * C * mass[i]
             if conducted is not None:
                 P_i = pressure(eos, rho_i, conducted[i])
             if summed is not None:
@@ -113,8 +115,13 @@ def rates(
                     Pi *= 0.5 * f[i] + fs[k]
                 term_i, term_j = P_term_i, P_term[k]
                 if summed is not None:
-                    term_i *= us[k] - summed.energy_shift[i]
-                    term_j *= energy[i] - shifts[k]
+                    shift_i, shift_j = by_share(
+                        weighting, summed.energy_shift[i], shifts[k], m_half_i, m_half[k]
+                    )
+                    term_i *= us[k] - shift_i
+                    term_j *= energy[i] - shift_j
+                else:
+                    term_i, term_j = by_share(weighting, term_i, term_j, m_half_i, m_half[k])
                 force[k], work = pair(scheme, term_i, term_j, slope_i, slope_j, Pi)
                 heating += work * v_dot_r
                 if conducted is not None:

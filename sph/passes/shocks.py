@@ -1,10 +1,11 @@
 """The pass over velocity gradients, for switches that tell shocks by them.
 
 Gradients are those of Cullen & Dehnen (2010, appendix B): with r = r_i - r_j and weights
-g_j = -m_j (dW/dr)/r, the matrix sum g v_ij r^T times the inverse of sum g r r^T is exact for
-every linear field. d(div v)/dt = div a - tr(L L), L the velocity gradient, takes the acceleration
-of the last step. (A difference of div v over a step would not do: a step cut short to land
-on an output divides what prediction and correction differ by, which does not shrink with it.)
+g_j = -w_j (dW/dr)/r (w_j the mass, or 1: `weighting`), the matrix sum g v_ij r^T times the inverse
+of sum g r r^T is exact for every linear field. d(div v)/dt = div a - tr(L L), L the velocity
+gradient, takes the acceleration of the last step. (A difference of div v over a step would not do:
+a step cut short to land on an output divides what prediction and correction differ by, which does
+not shrink with it.)
 """
 
 import numpy as np
@@ -14,6 +15,7 @@ from sph.compiled import COMPILED
 from sph.kernels import dw_over_q, normalisation, w
 from sph.neighbours.lists import IMAGE_SHIFT
 from sph.neighbours.order import BLOCK
+from sph.passes.weighting import mass_per_weight, weight
 from sph.viscosity import alpha_after
 
 # A pivot below this part of the trace means that neighbours lie on a line or in a plane: there is
@@ -58,7 +60,7 @@ def shocks(
     fields and div_v (N,) are of the density pass, acceleration (D, N) of the last step.
     """
     D = len(dim)
-    _, kernel, _, _, viscosity, _, _, _, _ = models
+    _, kernel, _, weighting, _, viscosity, _, _, _, _ = models
     lists, images, _, _ = neighbours
     start, count, candidates = lists
     sign, offset = images
@@ -78,7 +80,7 @@ def shocks(
     r_ij = np.empty((D, size))
     v_ij = np.empty((D, size))
     a_ij = np.empty((D, size))
-    weight = np.empty(size)
+    g = np.empty(size)
     matrix = np.empty((D, D))
     inverse = np.empty((D, D))
     L = np.empty((D, D))
@@ -92,9 +94,9 @@ def shocks(
                 x[d, k] = sign[image, d] * position[d, j] + offset[image, d]
                 v[d, k] = sign[image, d] * velocity[d, j]
                 a[d, k] = sign[image, d] * acceleration[d, j]
-            m[k] = mass[j]
+            m[k] = weight(weighting, mass[j])
             c_s[k] = sound_speed[j]
-            signed[k] = mass[j] * np.sign(div_v[j])
+            signed[k] = m[k] * np.sign(div_v[j])
         for i in range(block * BLOCK, min((block + 1) * BLOCK, mass.size)):
             H_inv = 1.0 / support[i]
             n = 0
@@ -113,17 +115,17 @@ def shocks(
                     v_ij[d, n] = velocity[d, i] - v[d, k]
                     a_ij[d, n] = acceleration[d, i] - a[d, k]
                     v_dot_r += v_ij[d, n] * r_ij[d, n]
-                weight[n] = -m[k] * dw_over_q(kernel, dim, q)
+                g[n] = -m[k] * dw_over_q(kernel, dim, q)
                 signs += signed[k] * w(kernel, dim, q)
                 closing = min(v_dot_r, 0.0) / q if q > 0.0 else 0.0
                 fastest = max(fastest, 0.5 * (sound_speed[i] + c_s[k]) - closing)  # eq 15
                 n += 1
-            signs *= C * H_inv**D / density[i]  # eq 17
+            signs *= mass_per_weight(weighting, mass[i]) * C * H_inv**D / density[i]  # eq 17
             for s in range(D):
                 for t in range(D):
                     total = 0.0
                     for k in range(n):
-                        total += weight[k] * r_ij[s, k] * r_ij[t, k]
+                        total += g[k] * r_ij[s, k] * r_ij[t, k]
                     matrix[s, t] = total
             _invert(matrix, inverse)
             divergence_rate = 0.0
@@ -131,8 +133,8 @@ def shocks(
                 for t in range(D):
                     total = total_a = 0.0
                     for k in range(n):
-                        total += weight[k] * v_ij[s, k] * r_ij[t, k]
-                        total_a += weight[k] * a_ij[s, k] * r_ij[t, k]
+                        total += g[k] * v_ij[s, k] * r_ij[t, k]
+                        total_a += g[k] * a_ij[s, k] * r_ij[t, k]
                     matrix[s, t] = total
                     divergence_rate += total_a * inverse[t, s] * H_inv
             divergence = 0.0

@@ -1,8 +1,9 @@
 """How each particle's support H and density are found from its neighbours (seed step 2a-2c).
 
-Both ways work on one particle's distances r[:nc] and masses m[:nc] to its candidates, and return
-(H for what follows, rho, Omega, wanted): `wanted` is 0.0, or, where H came to exceed `reach`, the
-radius within which the candidates are complete, the radius to list them to before trying again.
+Both ways work on one particle's distances r[:nc] and weights m[:nc] (by default masses, see
+`weighting`) of its candidates, and return (H for what follows, rho or the sum in its place, Omega,
+wanted): `wanted` is 0.0, or, where H came to exceed `reach`, the radius within which the candidates
+are complete, the radius to list them to before trying again.
 """
 
 from typing import NamedTuple

@@ -40,7 +40,7 @@ class Side(NamedTuple):
 
 
 class Problem(base.Problem):
-    """Shock tube along x with particles of one mass; y and z, where they are, are periodic."""
+    """Shock tube along x; y and z, where they are, are periodic."""
 
     defaults: ClassVar = {
         "physics.gamma": 1.4,
@@ -76,6 +76,11 @@ class Problem(base.Problem):
     lattice: Literal["cubic", "hexagonal", "bcc"] = Field(
         default="cubic",
         description='"cubic", "hexagonal" (2-D) or "bcc" (3-D), each side with its own spacing',
+    )
+    masses: Literal["equal", "equal_spacing"] = Field(
+        default="equal",
+        description='"equal": one mass, each side with its own spacing; "equal_spacing": one '
+        'spacing, masses in the ratio of the densities, which physics.density = "number" is for',
     )
     error_range: list[float] | None = Field(
         default=None,
@@ -130,7 +135,7 @@ class Problem(base.Problem):
 
     def initial(self, eos) -> base.InitialState:
         """Layers counted from the diaphragm, so that mass = density x volume of a site exactly."""
-        left, right, mass = self._sides()
+        left, right, masses = self._sides()
         cell = placement.unit_cell(self.lattice, self.dimension)
         sides = (left, range(-left.layers, 0)), (right, range(right.layers))
         stacks = [
@@ -144,7 +149,8 @@ class Problem(base.Problem):
         velocity = np.zeros_like(position)
         velocity[0] = state.velocity
         energy = eos.internal_energy(state.density, state.pressure)
-        return base.InitialState(position, velocity, np.full(position.shape[1], mass), energy)
+        mass = np.repeat(masses, [stack.shape[1] for stack in stacks])
+        return base.InitialState(position, velocity, mass, energy)
 
     def exact(self, eos, time: float, position: np.ndarray) -> dict[str, np.ndarray] | None:
         """The Riemann problem of an unbounded tube, at any (D, N) positions.
@@ -206,8 +212,8 @@ class Problem(base.Problem):
             *(np.where(is_left, *pair) for pair in zip(*self._states(), strict=True))
         )
 
-    def _sides(self) -> tuple[Side, Side, float]:
-        """Both sides and the mass of every particle: the gas of the domain shared by all.
+    def _sides(self) -> tuple[Side, Side, np.ndarray]:
+        """Both sides, and the mass (2,) of a particle of either: what it holds shared by all.
 
         Whole numbers of layers fill both sides exactly for certain n only, and a stack too long or
         too short sends waves from a wall. So the numbers that fit best are taken within LEEWAY of
@@ -218,15 +224,17 @@ class Problem(base.Problem):
         area = widths[1:].prod()
         lengths = np.abs(self.box[0] - self.discontinuity)
         densities = np.array([self.left.density, self.right.density])
-        masses = densities * lengths * area
-        share = masses.sum() / self.n
-        across = [self._cells_across(cell, share / density) for density in densities]
+        # what the particles share alike: the mass or, with one spacing, the volume
+        shared = densities if self.masses == "equal" else np.ones(2)
+        held = shared * lengths * area
+        share = held.sum() / self.n
+        across = [self._cells_across(cell, share / per_volume) for per_volume in shared]
         per_layer = np.array([np.prod(counts, dtype=int) for counts in across])
-        layers = _whole_layers(masses, per_layer, self.n)
-        mass = masses.sum() / (layers @ per_layer)
-        thickness = mass * per_layer / (densities * area)
+        layers = _whole_layers(held, per_layer, self.n)
+        share = held.sum() / (layers @ per_layer)
+        thickness = share * per_layer / (shared * area)
         left, right = (Side(int(layers[i]), float(thickness[i]), across[i]) for i in (0, 1))
-        return left, right, float(mass)
+        return left, right, share / shared * densities
 
     def _cells_across(self, cell: placement.Cell, volume: float) -> tuple[int, ...]:
         """Whole numbers of cells along y and z, nearest to cells of `volume` a site."""
@@ -244,9 +252,9 @@ def _of_one_and_other(share: np.ndarray, n: int) -> np.ndarray:
     return np.vstack([np.stack([one, other], axis=1), np.stack([one, other + 1], axis=1)])
 
 
-def _whole_layers(masses: np.ndarray, per_layer: np.ndarray, n: int) -> np.ndarray:
-    """Numbers of layers left and right for about n particles of one mass (see `Problem._sides`)."""
-    share = masses / masses.sum() / per_layer  # of n, in layers
+def _whole_layers(held: np.ndarray, per_layer: np.ndarray, n: int) -> np.ndarray:
+    """Numbers of layers left and right for about n equal shares of `held` (2,)."""
+    share = held / held.sum() / per_layer  # of n, in layers
     layers = np.vstack([_of_one_and_other(share, n), _of_one_and_other(share[::-1], n)[:, ::-1]])
     particles = layers @ per_layer
     excess = layers - share * particles[:, None]  # by so many layers is a stack too long
@@ -257,7 +265,7 @@ def _whole_layers(masses: np.ndarray, per_layer: np.ndarray, n: int) -> np.ndarr
     best = np.lexsort(keys)[0]
     if away[best] > n / 2:
         raise ValueError(
-            f"n = {n} is too small: a layer of either gas in particles of one mass takes "
+            f"n = {n} is too small: a layer of either gas in particles of equal share takes "
             f"{particles[best]}"
         )
     return layers[best]

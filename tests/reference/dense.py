@@ -96,6 +96,7 @@ class Scene:
     switched_conductivity: bool = False  # where u is not linear, after Price & Monaghan (2005)
     kernel: str = "wendland_c2"
     flattened: bool = False  # the cubic spline's flattened gradient, in eqs 22-23 only
+    density: str = "mass"  # or "number"
     balsara: bool = True
     density_passes: int | str = 2  # or "converged"
     unsettled: float = 0.05  # change of H in the last counted pass beyond which it is solved for
@@ -108,6 +109,10 @@ class Scene:
     @property
     def finds_shocks(self):
         return isinstance(self.alpha, dict) and "ell" in self.alpha
+
+    def weight(self, mass):
+        """What rho_i and H_i count: (N,) masses, or ones."""
+        return mass if self.density == "mass" else np.ones_like(mass)
 
     @property
     def h_ratio(self):
@@ -233,30 +238,31 @@ def _density(scene, position, mass, support):
     for (low, high), boundary in zip(scene.box, scene.boundaries, strict=True):
         if boundary != "open" and support.max() > high - low:
             raise ValueError("H exceeds the box: one image to each side does not suffice")
-    n = len(mass)
+    n, weight = len(mass), scene.weight(mass)
     pairs = _pairs(scene, position, support, np.zeros(n))
     w, _, by_support = scene.kernel_at(pairs.r, support[pairs.i])
-    m_j = mass[pairs.j]
-    rho = pairs.sum(m_j * w, n)
-    factor = support / (scene.dimension * rho)
-    omega = 1 + factor * pairs.sum(m_j * by_support, n)
-    return rho, omega, 1 + factor * pairs.sum(m_j * abs(by_support), n)
+    w_j = weight[pairs.j]
+    total = pairs.sum(w_j * w, n)
+    factor = support / (scene.dimension * total)
+    omega = 1 + factor * pairs.sum(w_j * by_support, n)
+    omega_scale = 1 + factor * pairs.sum(w_j * abs(by_support), n)
+    return mass / weight * total, omega, omega_scale
 
 
-def _kernel_mass(scene, position, mass, support):
-    """Sum_j m_j w(r_ij/H_i) = H^D rho: it grows with H, and eq 15 asks it to be (H/h eta)^D m."""
-    pairs = _pairs(scene, position, support, np.zeros(len(mass)))
+def _kernel_weight(scene, position, weight, support):
+    """Sum_j w_j w(r_ij/H_i): it grows with H, and eq 15 asks it to be (H/h eta)^D w_i."""
+    pairs = _pairs(scene, position, support, np.zeros(len(weight)))
     w = scene.kernel_at(pairs.r, support[pairs.i])[0]
-    return pairs.sum(mass[pairs.j] * w, len(mass)) * support**scene.dimension
+    return pairs.sum(weight[pairs.j] * w, len(weight)) * support**scene.dimension
 
 
-def _bracket(scene, position, mass, guess, target):
-    """(low, high) around the H at which the kernel mass reaches its target."""
+def _bracket(scene, position, weight, guess, target):
+    """(low, high) around the H at which the kernel's weight reaches its target."""
     high = np.array(guess, dtype=float)
     low = high.copy()
     for _ in range(100):
-        short = _kernel_mass(scene, position, mass, high) < target
-        over = _kernel_mass(scene, position, mass, low) >= target
+        short = _kernel_weight(scene, position, weight, high) < target
+        over = _kernel_weight(scene, position, weight, low) >= target
         if not (short.any() or over.any()):
             return low, high
         high[short] *= 2
@@ -266,17 +272,18 @@ def _bracket(scene, position, mass, guess, target):
 
 def _converged_support(scene, position, mass, guess):
     """H solving eqs 7 and 15 together, by bisection until no number lies between the ends."""
-    target = (scene.h_ratio * scene.eta) ** scene.dimension * mass
-    low, high = _bracket(scene, position, mass, guess, target)
+    weight = scene.weight(mass)
+    target = (scene.h_ratio * scene.eta) ** scene.dimension * weight
+    low, high = _bracket(scene, position, weight, guess, target)
     n = len(mass)
     pairs = _pairs(scene, position, high, np.zeros(n))
-    m_j = mass[pairs.j]
+    w_j = weight[pairs.j]
     for _ in range(1100):  # more than the bits of any interval of doubles
         middle = 0.5 * (low + high)
         if np.all((middle == low) | (middle == high)):
             break
         w, _ = KERNELS[scene.kernel](pairs.r / middle[pairs.i], scene.dimension)
-        over = pairs.sum(m_j * w, n) >= target
+        over = pairs.sum(w_j * w, n) >= target
         low, high = np.where(over, low, middle), np.where(over, middle, high)
     return high
 
@@ -324,12 +331,14 @@ def _cross(a, b):
 def _flow(scene, pairs, mass, velocity, state):
     """Divergence and curl, eqs 16 and 17."""
     n = len(mass)
-    m_dW = mass[pairs.j] * scene.kernel_at(pairs.r, state["support"][pairs.i])[1]
+    # dn_i/dt, n_i the density or the number density, whose eq 7 is differentiated
+    weight = scene.weight(mass)
+    w_dW = weight[pairs.j] * scene.kernel_at(pairs.r, state["support"][pairs.i])[1]
     v_ij = pairs.difference(velocity)
-    per_volume = 1 / (state["omega"] * state["density"])
+    per_volume = 1 / (state["omega"] * state["density"] * weight / mass)
     # eq 16 is printed without this minus: with v_ij = v_i - v_j an expansion would be negative
-    approach = -m_dW * (v_ij * pairs.unit).sum(axis=0)
-    turn = m_dW * _cross(v_ij, pairs.unit)
+    approach = -w_dW * (v_ij * pairs.unit).sum(axis=0)
+    turn = w_dW * _cross(v_ij, pairs.unit)
     return {
         "divergence": per_volume * pairs.sum(approach, n),
         "curl": np.linalg.norm(per_volume * pairs.sum(turn, n), axis=0),
@@ -372,36 +381,53 @@ class PairForce(NamedTuple):
 
 def _pressure_grad_h(scene, pairs, mass, energy, state, along, radial):
     """The pressures of eqs 22 and 23: `along` is dW/dr at H_i and at H_j."""
-    P = state["pressure"] / (state["omega"] * state["density"] ** 2)
-    m_dW = mass[pairs.j] / 2 * (along[0] + along[1])
-    push, work = -(P[pairs.i] + P[pairs.j]) * m_dW, P[pairs.i] * m_dW * radial
-    return PairForce(push, work, abs(push), abs(work))
+    own, other = (
+        term * (along[0] + along[1]) / 2 for term in _pressure_terms(scene, pairs, mass, state)
+    )
+    return PairForce(-(own + other), own * radial, abs(own) + abs(other), abs(own * radial))
+
+
+def _pressure_terms(scene, pairs, mass, state):
+    """(P,) what dW_i and dW_j are multiplied by in the acceleration of i.
+
+    By mass m_j P/(Omega rho^2) of either. By number, with volumes V = m/rho = 1/n, the energy
+    changes by -P dV = P V^2 dn: V_i^2 P_i/Omega_i and V_j^2 P_j/Omega_j, over m_i.
+    """
+    i, j = pairs.i, pairs.j
+    if scene.density == "number":
+        squared = (mass / state["density"]) ** 2 * state["pressure"] / state["omega"]
+        return squared[i] / mass[i], squared[j] / mass[i]
+    term = state["pressure"] / (state["omega"] * state["density"] ** 2)
+    return mass[j] * term[i], mass[j] * term[j]
 
 
 def _pressure_variational(scene, pairs, mass, energy, state, along, radial):
     """Springel & Hernquist (2002), eqs 7 and 8, and the energy that follows from their entropy."""
     own, other = (
-        (state["pressure"] / (state["omega"] * state["density"] ** 2))[side] * mass[pairs.j] * dW
-        for side, dW in zip((pairs.i, pairs.j), along, strict=True)
+        term * dW
+        for term, dW in zip(_pressure_terms(scene, pairs, mass, state), along, strict=True)
     )
     return PairForce(-(own + other), own * radial, abs(own) + abs(other), abs(own * radial))
 
 
 def _pressure_energy(scene, pairs, mass, energy, state, along, radial):
-    """Hopkins (2013), eqs 21 and 22, for supports that hold a mass as eqs 7 and 15 ask.
+    """Hopkins (2013), eqs 21 and 22, also for supports that hold a mass as eqs 7 and 15 ask.
 
-    f_ij = 1 - [H_i/(D rho_i) dP_i/dH_i] / [(gamma - 1) u_j Omega_i]: his eq 12 with m_j for the
-    quantity that is summed to find H, where he sums 1.
+    f_ij = 1 - [H_i/(D n_i) dP_i/dH_i] / [(gamma - 1) m_j u_j Omega_i] is his eq 12. With m_j for
+    the quantity that is summed to find H, where he sums 1, it is rho_i and no m_j.
     """
     i, j, n, P = pairs.i, pairs.j, len(mass), state["pressure"]
     by_support = scene.kernel_at(pairs.r, state["support"][i])[2]
     terms = (scene.gamma - 1) * mass[j] * energy[j] * by_support
-    per_mass = state["support"] / (scene.dimension * state["density"] * state["omega"])
-    change, change_scale = per_mass * pairs.sum(terms, n), per_mass * pairs.sum(abs(terms), n)
+    by_number = scene.density == "number"
+    n_i = state["density"] / mass if by_number else state["density"]
+    m_j = mass if by_number else np.ones(n)
+    per_sum = state["support"] / (scene.dimension * n_i * state["omega"])
+    change, change_scale = per_sum * pairs.sum(terms, n), per_sum * pairs.sum(abs(terms), n)
 
     def term(side, opposite, dW):
         factor = (scene.gamma - 1) ** 2 * mass[j] * energy[i] * energy[j] / P[side] * dW
-        in_f = 1 / ((scene.gamma - 1) * energy[opposite])
+        in_f = 1 / ((scene.gamma - 1) * m_j[opposite] * energy[opposite])
         f, f_scale = 1 - change[side] * in_f, 1 + change_scale[side] * in_f
         return factor * f, abs(factor) * f_scale
 
@@ -503,7 +529,7 @@ def _moments(scene, pairs, mass, support):
     """
     with np.errstate(divide="ignore", invalid="ignore"):
         slope = scene.kernel_at(pairs.r, support[pairs.i])[1] / pairs.r
-    weight = mass[pairs.j] * np.where(pairs.r > 0, -slope, 0.0)
+    weight = scene.weight(mass)[pairs.j] * np.where(pairs.r > 0, -slope, 0.0)
     moments = _products(pairs, weight, pairs.r * pairs.unit, len(mass))
     flat = np.linalg.eigvalsh(moments)[:, 0] <= 1e-6 * np.trace(moments, axis1=1, axis2=2)
     moments[flat] = np.eye(scene.dimension)
@@ -535,7 +561,9 @@ def shock_alpha(scene, pairs, mass, velocity, acceleration, alpha, dt, state):
     S = 0.5 * (L + L.transpose(0, 2, 1))
     S = S - divergence[:, None, None] / scene.dimension * np.eye(scene.dimension)
     w = scene.kernel_at(pairs.r, H[i])[0]
-    R = pairs.sum(np.sign(state["divergence"][j]) * mass[j] * w, n) / state["density"]  # eq 17
+    weight = scene.weight(mass)
+    n_i = state["density"] * weight / mass
+    R = pairs.sum(np.sign(state["divergence"][j]) * weight[j] * w, n) / n_i  # eq 17
     converging = abs(2 * (1 - R) ** 4 * divergence) ** 2
     shear = np.einsum("nab,nab->n", S, S)
     flowing = converging + shear > 0

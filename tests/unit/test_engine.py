@@ -19,6 +19,7 @@ from sph.neighbours import order as ordering
 from sph.neighbours.search import Origin, Search
 from sph.passes import contacts, density, rates, shocks
 from sph.passes.smoothing import Converged, FixedPasses
+from sph.passes.weighting import ByMass, ByNumber
 from sph.problems import base
 from sph.scene import Scene
 from sph.threads import Team
@@ -56,12 +57,14 @@ class Case:
     scheme: str = "grad_h"
     conductivity: tuple[str, float] | None = None
     switched_conductivity: bool = False
+    density: str = "mass"
 
     def __str__(self):
         parts = [f"{len(self.boundaries)}d", *self.boundaries, self.kernel, str(self.passes)]
         parts += [self.scheme] * (self.scheme != "grad_h")
         parts += [self.conductivity[0]] if self.conductivity else []
         parts += ["at contacts"] * self.switched_conductivity
+        parts += ["number"] * (self.density == "number")
         parts += ["switched"] * self.evolves + ["shocks"] * self.finds_shocks
         parts += ["balsara"] * self.balsara
         return "-".join(parts + ["flattened"] * self.flattened)
@@ -97,6 +100,7 @@ class Case:
             scheme=self.scheme,
             conductivity=self.conductivity,
             switched_conductivity=self.switched_conductivity,
+            density=self.density,
             kernel=self.kernel,
             flattened=self.flattened,
             balsara=self.balsara,
@@ -128,6 +132,7 @@ class Case:
             smoothing=Converged(TIGHT)
             if self.passes == "converged"
             else FixedPasses(self.passes, TIGHT),
+            weighting=ByNumber() if self.density == "number" else ByMass(),
             eos=ideal_gas.IdealGas(1.4),
             viscosity=self.viscosity,
             conductivity=self.conductivity_model,
@@ -164,8 +169,13 @@ CASES = [
     Case((OPEN,), W, 2, scheme="pressure_energy"),
     Case((MIRROR, PERIODIC), W, "converged", SWITCHED, scheme="pressure_energy", conductivity=JUMP),
     Case((PERIODIC, OPEN, MIRROR), W, 2, scheme="pressure_energy", conductivity=APPROACH),
+    Case((MIRROR,), W, 2, density="number"),
+    Case((PERIODIC, OPEN), W, "converged", SWITCHED, density="number"),
+    Case((OPEN, MIRROR, PERIODIC), W, 2, scheme="variational", density="number"),
+    Case((OPEN, OPEN), W, 2, scheme="pressure_energy", density="number", conductivity=JUMP),
     Case((MIRROR,), W, 2, alpha=SHOCKS, balsara=False),
     Case((OPEN,), W, 2, conductivity=JUMP, switched_conductivity=True),
+    Case((MIRROR, OPEN), W, 2, alpha=SHOCKS, density="number"),
     Case((OPEN, MIRROR), W, "converged", alpha=SHOCKS, scheme="variational"),
     Case((MIRROR, PERIODIC), S, 2, conductivity=APPROACH, switched_conductivity=True),
     Case((PERIODIC, MIRROR, OPEN), "wendland_c4", 2, alpha=SHOCKS, balsara=False),
@@ -223,6 +233,8 @@ def random_gas(case, lists, seed=3):
     # between two builds particles may be past a wall that they will be brought back through
     position = concentrated(case.box, count, random, beyond=0.02 if lists == "reused" else 0.0)
     mass = random.uniform(1, 1.3, count) / count
+    if case.density == "number":
+        mass *= 1e3 ** random.random(count)
     velocity = random.normal(size=position.shape)
     energy, alpha = random.uniform(0.5, 2, count), random.uniform(*SWITCHED.values(), count)
     converged = replace(case.dense_scene, density_passes="converged")
@@ -410,6 +422,7 @@ def simulate(case, gas, end, threads=1):
         gamma=1.4, alpha=alpha, eta=case.eta, density_passes=case.passes, scheme=case.scheme,
         conductivity=name
         and {"name": name, "strength": strength, "switched": case.switched_conductivity},
+        density=case.density,
     )  # fmt: skip
     whole = config.Config(
         problem, physics, config.Time(end=end), config.Output(interval=end), config.Run()

@@ -206,6 +206,25 @@ def test_layers_of_any_two_gases_stay_inside_and_carry_their_mass(dimension, kin
             assert in_layer == pytest.approx(density, rel=ROUND_OFF)
 
 
+@pytest.mark.parametrize("dimension", [1, 2, 3])
+def test_equal_spacing_has_one_lattice_and_masses_in_the_ratio_of_densities(dimension):
+    gas = {"left": {"density": 1.0, "pressure": 1.0}, "right": {"density": 1e-3, "pressure": 1.0}}
+    n = 36 * 9**2 if dimension == 3 else 2000  # cubes that fit both sides
+    problem = ShockTube(
+        dimension=dimension, n=n, domain=[0.0, 9.0], discontinuity=3.0, masses="equal_spacing",
+        **gas,
+    )  # fmt: skip
+    state = problem.initial(AIR)
+    left = state.position[0] < 3.0
+    assert left.sum() * 2 == (~left).sum()  # a third of the length
+    np.testing.assert_allclose(state.mass[left], state.mass[0], rtol=ROUND_OFF)
+    np.testing.assert_allclose(state.mass[~left], 1e-3 * state.mass[0], rtol=ROUND_OFF)
+    volume = np.prod(problem.box[:, 1] - problem.box[:, 0])
+    assert state.mass.sum() == pytest.approx(volume * (1.0 + 2e-3) / 3, rel=ROUND_OFF)
+    layers = np.unique(np.round(state.position[0], 9))
+    np.testing.assert_allclose(np.diff(layers), 9.0 / len(layers), rtol=1e-6)  # of the rounding
+
+
 def test_layers_keep_their_distance_across_diaphragm_and_transverse_faces():
     problem = ShockTube(**SOD_3D)
     state = problem.initial(MONATOMIC)
