@@ -23,7 +23,9 @@ sets a key from the command line.
 def text() -> str:
     """The whole page: [problem] of each problem, and the tables that all share."""
     pages = {name: config.template(name) for name in registry.names("sph.problems")}
-    shared = "\\[physics], [time], [output], [run]: the defaults are those of `shock_tube`"
+    shared = (
+        "\\[physics], [time], [output], [report], [run]: the defaults are those of `shock_tube`"
+    )
     parts = [HEAD]
     for name, page in pages.items():
         parts.append(f"## {name}\n\n```toml\n{_problem_table(page)}```\n")

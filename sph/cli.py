@@ -48,6 +48,10 @@ def run(config, overrides, directory, threads, dry_run, force):
     from sph import config as configuration
 
     resolved = configuration.load(config, _with_threads(overrides, threads))
+    from sph.analysis import reference
+
+    where = directory or Path("runs") / config.stem
+    reference.check(resolved, where)
     if dry_run:
         from sph import preview
 
@@ -57,7 +61,7 @@ def run(config, overrides, directory, threads, dry_run, force):
     from sph.analysis import summary
     from sph.output.run_directory import RunDirectory
 
-    target = RunDirectory.create(directory or Path("runs") / config.stem, force)
+    target = RunDirectory.create(where, force)
     result = runner.run(resolved, target, progress.suited())
     click.echo(summary.in_words(result))
     click.echo(f"Results: {target.path} (`sph plot {target.path}` draws them).")

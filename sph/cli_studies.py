@@ -46,7 +46,8 @@ def sweep(config, varies, overrides, directory, jobs, scheduler, slurm):
 @click.option("--by", multiple=True, metavar="KEY",
               help="Tell lines apart by this key; all keys that vary if not given.")  # fmt: skip
 @click.option("--reference", type=click.Path(path_type=Path), metavar="DIR",
-              help="Take errors against this run, a finer one.")  # fmt: skip
+              help="For runs made already: take errors against this finer run, in place "
+              "of those in their summaries.")  # fmt: skip
 @click.option("-o", "directory", type=click.Path(path_type=Path), metavar="DIR",
               help="Where all goes; report/ in the first DIR if not given.")  # fmt: skip
 def report(sources, field, norm, cost, by, reference, directory):

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
+from sph.analysis import reference
 from sph.clock import Clock
 from sph.config import Config
 from sph.errors import ConfigError, FileError
@@ -34,6 +35,7 @@ def restart(
     checkpoint = checkpoints.read(path)
     config = checkpoint.config.override(overrides)
     _check_changes(config, checkpoint)
+    reference.check(config, directory or (home and home.path))
     if source.is_dir():
         _note_damaged(home, path, progress)
     target, number = _place_to_go_on(home, path, directory)

@@ -5,10 +5,11 @@ import math
 import os
 from collections.abc import Iterator
 from contextlib import closing, contextmanager
+from pathlib import Path
 
 import numpy as np
 
-from sph.analysis import summary
+from sph.analysis import reference, summary
 from sph.clock import Clock
 from sph.config import Config
 from sph.errors import NumericalError, Stopped
@@ -226,4 +227,10 @@ class Runner:
             reason=reason,
         )
         self.directory.write_summary(result)
+        named = self.config.report.reference
+        if named and status == "done":  # the summary is kept if the reference has gone
+            fine = reference.Reference(Path(named))
+            where = str(self.directory.path)
+            result["errors"] = reference.errors_against(self._checkpoint(), fine, where)
+            self.directory.write_summary(result)
         return result

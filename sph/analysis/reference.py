@@ -1,5 +1,6 @@
 """Errors against a finer run of the same problem, for want of an exact solution."""
 
+import os
 from pathlib import Path
 
 import h5py
@@ -7,6 +8,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from sph.analysis.errors import FIELDS, norms
+from sph.config import Config
 from sph.domain import Domain
 from sph.errors import ConfigError, FileError
 from sph.output import checkpoint
@@ -40,16 +42,39 @@ class Reference:
         return self._read[1]
 
 
-def errors_against(reference: Reference, path: Path) -> dict:
-    """Norms of a run's last state against the reference at its particles, as `against_exact`.
+def check(config: Config, target: Path | None) -> None:
+    """See that a run into `target` will find at its end the reference it names, if it names one.
+
+    target: None where nothing is to be written. Raises FileError where there is no such run or its
+    checkpoint is damaged, ConfigError where it has none at time.end, is of another problem or is
+    `target` itself.
+    """
+    if not config.report.reference:
+        return
+    path = Path(config.report.reference)
+    if target is not None and path.resolve() == Path(target).resolve():
+        raise ConfigError(
+            f"report.reference = {path}: this is the directory that the run itself is to go to.\n"
+            "Try: another directory for the run, with -o."
+        )
+    fine = Reference(path).at(config.time.end)
+    _check(config, fine.config, path, "this run")
+
+
+def errors_of(path: Path, reference: Reference) -> dict:
+    """`errors_against` of the last state in a run directory. Raises as it, and FileError."""
+    return errors_against(checkpoint.read(RunDirectory.open(path).latest()), reference, str(path))
+
+
+def errors_against(coarse: Checkpoint, reference: Reference, name: str) -> dict:
+    """Norms of a state against the reference at its particles, as those of `against_exact`.
 
     The reference's fields are carried there by its own kernels, which smooth them over its own
-    spacing: it must be finer by more than the accuracy wanted. Raises FileError, and ConfigError
-    where the two do not fit.
+    spacing: it must be finer by more than the accuracy wanted. `name`: of the state's run, for
+    errors. Raises FileError, and ConfigError where the two do not fit.
     """
-    coarse = checkpoint.read(RunDirectory.open(path).latest())
     fine = reference.at(coarse.time)
-    _check(coarse, fine, reference.run.path, path)
+    _check(coarse.config, fine.config, reference.run.path, name)
     config, particles = coarse.config, coarse.particles
     inside, words = config.problem.error_region(
         config.physics.eos_model(), coarse.time, particles.position
@@ -62,7 +87,7 @@ def errors_against(reference: Reference, path: Path) -> dict:
     return {
         "region": words,
         "particles": int(inside.sum()),
-        "reference": str(reference.run.path),
+        "reference": os.path.abspath(reference.run.path),
         "fields": fields,
     }
 
@@ -112,13 +137,13 @@ def _fields(state: Checkpoint) -> dict[str, np.ndarray]:
     }
 
 
-def _check(coarse: Checkpoint, fine: Checkpoint, reference: Path, path: Path) -> None:
-    ours, theirs = coarse.config.problem, fine.config.problem
+def _check(coarse: Config, fine: Config, reference: Path, name: str) -> None:
+    ours, theirs = coarse.problem, fine.problem
     for key in ("name", "dimension"):
         if getattr(ours, key) != getattr(theirs, key):
             raise ConfigError(
                 f"the reference {reference} has problem.{key} = {getattr(theirs, key)}, but "
-                f"{path} has {getattr(ours, key)}."
+                f"{name} has {getattr(ours, key)}.\nTry: a reference of the same problem."
             )
 
 

@@ -12,7 +12,8 @@ from sph.version import __version__
 def of_run(simulation, history: dict[str, np.ndarray], status: str, reason: str | None) -> dict:
     """The summary as a dictionary, from the simulation's last state and the whole history.
 
-    status: "done", "stopped" or "failed", then with the reason.
+    status: "done", "stopped" or "failed", then with the reason. Errors are those against the exact
+    solution; where the configuration names a reference they are left to `reference.errors_against`.
     """
     scene, particles = simulation.scene, simulation.particles
     problem, eos = scene.config.problem, scene.eos
@@ -35,7 +36,9 @@ def of_run(simulation, history: dict[str, np.ndarray], status: str, reason: str 
         "left_out": outside,
     }
     if status != "failed":
-        result["errors"] = errors.against_exact(problem, eos, simulation.time, particles, pressure)
+        if not scene.config.report.reference:
+            exact = errors.against_exact(problem, eos, simulation.time, particles, pressure)
+            result["errors"] = exact
         report = problem.report(eos, simulation.time, particles, pressure)
         result["report"] = report | problem.over_time(history)
     return result
@@ -115,9 +118,9 @@ def in_words(summary: dict) -> str:
             f"{name.replace('_', ' ')} {norm['L1']:.3g}"
             for name, norm in summary["errors"]["fields"].items()
         )
-        lines.append(
-            f"Error (L1 against the exact solution, {summary['errors']['region']}): {fields}."
-        )
+        named = summary["errors"].get("reference")
+        truth = "the exact solution" if named is None else f"the run {named}"
+        lines.append(f"Error (L1 against {truth}, {summary['errors']['region']}): {fields}.")
     else:
         lines.append("Error: this problem has no exact solution here.")
     for name, value in (summary["report"] or {}).items():

@@ -1,11 +1,12 @@
 """The configuration: every key once, with its type, bounds, default and help."""
 
 import dataclasses
+import os
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, Field, model_validator
+from pydantic import AfterValidator, BaseModel, Field, model_validator
 
 from sph import registry
 from sph.config import commented, reading
@@ -185,6 +186,21 @@ class Output(Section):
     interval: float = Field(gt=0, description="time between checkpoints, in code units")
 
 
+def _absolute(path: str) -> str:
+    return path and os.path.abspath(path)
+
+
+class Report(Section):
+    """What a run tells of itself when it has ended."""
+
+    reference: Annotated[str, AfterValidator(_absolute)] = Field(
+        "",
+        description="directory of a finer run of the same problem, against which errors are taken "
+        "in place of an exact solution, none if empty; one that does not begin with / is looked "
+        "for from the current directory at the time it is given",
+    )
+
+
 class Run(Section):
     """How the run is carried out; none of it changes a result."""
 
@@ -209,6 +225,7 @@ class Config:
     physics: Physics
     time: Time
     output: Output
+    report: Report
     run: Run
 
     def to_toml(self, include_run: bool = True) -> str:
@@ -228,6 +245,7 @@ SECTIONS: dict[str, type[Section]] = {
     "physics": Physics,
     "time": Time,
     "output": Output,
+    "report": Report,
     "run": Run,
 }
 

@@ -26,13 +26,13 @@ def make(sources: Sequence[Path], question: Question) -> Report:
 
 def _against(path: Path, rows: Sequence[runs.Row]) -> list[runs.Row]:
     """The rows without the reference itself, with their errors against it."""
-    from sph.analysis.reference import Reference, errors_against
+    from sph.analysis.reference import Reference, errors_of
 
     reference = Reference(path)
     others = [row for row in rows if row.path != path.resolve()]
     for row in others:
         if row.status == "done":
-            row.reference = errors_against(reference, row.path)
+            row.reference = errors_of(row.path, reference)
     return others
 
 

@@ -41,6 +41,11 @@ class Row:
         return bool(self.summary) and self.summary["cost"]["session"]["steps"] < self.steps
 
     @property
+    def truth(self) -> str | None:
+        """The run that its errors are against, or None where that is the exact solution."""
+        return (self.reference or self.summary.get("errors") or {}).get("reference")
+
+    @property
     def steps(self) -> int:
         return self.summary.get("steps", 0)
 

@@ -1,5 +1,7 @@
 """What a report says in sentences."""
 
+from pathlib import Path
+
 import numpy as np
 
 from sph.analysis.report.compare import COSTS, Report, Series
@@ -24,8 +26,9 @@ def sentences(report: Report) -> list[str]:
 
 def _costs(report: Report) -> str:
     question = report.question
-    named = question.reference
-    against = f" against the run {named.resolve().name}" if named is not None else ""
+    truths = {row.truth for row in report.rows}
+    named = truths.pop() if len(truths) == 1 and "." not in question.field else None
+    against = f" against the run {Path(named).name}" if named is not None else ""
     text = f"The error is {question.error_name}{against}, weighed with {COSTS[question.cost][0]}"
     if question.cost in ("cpu", "wall"):
         text += f" without compilation and {STARTING.replace('start', 'the start')}"
@@ -71,6 +74,10 @@ def _warnings(report: Report) -> list[str]:
             f"Restarted, so their time includes what their first sessions took to start: "
             f"{', '.join(restarted)}."
         )
+    truths = dict.fromkeys(row.truth for row in report.rows)
+    if len(truths) > 1 and "." not in report.question.field:
+        told = (f"the run {Path(one).name}" if one else "the exact solution" for one in truths)
+        said.append(f"Errors are not all against the same: some are against {', '.join(told)}.")
     different = [key for key in ("problem.name", "problem.dimension", "time.end")
                  if key in report.keys]  # fmt: skip
     if different:

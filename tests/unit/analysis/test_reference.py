@@ -8,7 +8,7 @@ from click.testing import CliRunner
 
 from sph import config as configuration
 from sph import runner
-from sph.analysis.reference import Reference, at_points, errors_against
+from sph.analysis.reference import Reference, at_points, check, errors_of
 from sph.cli import main
 from sph.errors import ConfigError, FileError
 from sph.output.checkpoint import Checkpoint
@@ -124,7 +124,7 @@ def tubes(tmp_path_factory):
 def test_errors_against_a_finer_run_are_nearly_those_against_the_exact_solution(tubes):
     fine = Reference(tubes / "n=800")
     for n in (50, 100):
-        found = errors_against(fine, tubes / f"n={n}")
+        found = errors_of(tubes / f"n={n}", fine)
         exact = json.loads((tubes / f"n={n}" / "summary.json").read_text())["errors"]
         assert found["particles"] == exact["particles"]
         for name in ("density", "velocity", "pressure", "internal_energy"):
@@ -136,8 +136,8 @@ def test_errors_against_a_finer_run_are_nearly_those_against_the_exact_solution(
 
 
 def test_a_run_has_no_error_against_itself_but_its_smoothing(tubes):
-    itself = errors_against(Reference(tubes / "n=100"), tubes / "n=100")
-    finer = errors_against(Reference(tubes / "n=800"), tubes / "n=100")
+    itself = errors_of(tubes / "n=100", Reference(tubes / "n=100"))
+    finer = errors_of(tubes / "n=100", Reference(tubes / "n=800"))
     assert 0.0 < itself["fields"]["density"]["L1"] < finer["fields"]["density"]["L1"]
 
 
@@ -156,9 +156,97 @@ def test_what_does_not_fit(tubes, tmp_path):
     config = configuration.from_text(text).override(["time.end=0.02"])
     runner.run(config, other, Lines())
     with pytest.raises(ConfigError, match=r"has no checkpoint at t = 0\.05"):
-        errors_against(Reference(other.path), tubes / "n=50")
+        errors_of(tubes / "n=50", Reference(other.path))
     with pytest.raises(FileError, match="is not a run directory"):
         Reference(tubes)
     (other.path / "checkpoints" / "checkpoint_000000.h5").write_text("damaged")
     with pytest.raises(FileError, match="is not a checkpoint, or damaged"):
         Reference(other.path)
+
+
+# --- a reference that the configuration names -------------------------------------------------
+
+
+def sph_(*words):
+    return CliRunner().invoke(main, [str(word) for word in words])
+
+
+@pytest.fixture
+def naming(tubes, tmp_path, monkeypatch):
+    """A configuration that names the finest tube, relative to the current directory."""
+    monkeypatch.chdir(tubes)
+    path = tmp_path / "tube.toml"
+    text = (tubes / "n=50" / "config.toml").read_text()
+    path.write_text(text.replace('reference = ""', 'reference = "n=800"'))
+    return path
+
+
+def test_a_run_ends_with_its_errors_against_the_reference(naming, tubes, tmp_path, monkeypatch):
+    result = sph_("run", naming, "-o", tmp_path / "run")
+    assert result.exit_code == 0, result.output
+    assert f"Error (L1 against the run {tubes / 'n=800'}" in result.stdout
+    found = json.loads((tmp_path / "run" / "summary.json").read_text())["errors"]
+    assert found == errors_of(tubes / "n=50", Reference(tubes / "n=800"))  # the same particles
+    monkeypatch.chdir(tmp_path)  # the report needs no reference, nor does a restart lose it
+    said = sph_("report", "run", "-o", tmp_path / "report").stdout
+    assert "The error is L1 of density against the run n=800" in said
+    restarted = sph_("restart", "run/checkpoints/checkpoint_000000.h5", "-o", "again")
+    assert restarted.exit_code == 0, restarted.output
+    assert json.loads((tmp_path / "again" / "summary.json").read_text())["errors"] == found
+
+
+def test_errors_against_different_truths_are_told_apart(naming, tubes, tmp_path):
+    sph_("run", naming, "-o", tmp_path / "run", "--set", "problem.n=60")
+    said = sph_("report", tubes / "n=50", tmp_path / "run", "-o", tmp_path / "report").stdout
+    assert "Errors are not all against the same" in said
+    assert "The error is L1 of density, weighed" in said
+
+
+@pytest.mark.parametrize("dry", [[], ["--dry-run"]])
+@pytest.mark.parametrize(
+    ("setting", "code", "words"),
+    [
+        ("report.reference=n=12345", 4, "does not exist"),
+        ("time.end=0.01", 2, "has no checkpoint at t = 0.01"),
+        ("problem.n=60", 2, "the directory that the run itself is to go to"),
+    ],
+)
+def test_a_reference_that_will_not_do_is_told_before_the_run(
+    naming, tubes, tmp_path, setting, code, words, dry
+):
+    target = tubes / "n=800" if "itself" in words else tmp_path / "run"
+    before = sorted((tubes / "n=800" / "checkpoints").iterdir())
+    result = sph_("run", naming, "-o", target, "--force", "--set", setting, *dry)
+    assert result.exit_code == code
+    assert words in result.stderr
+    assert "Try: " in result.stderr
+    assert not (tmp_path / "run").exists()
+    assert sorted((tubes / "n=800" / "checkpoints").iterdir()) == before
+
+
+def test_a_restart_looks_for_it_first_and_can_do_without(naming, tubes, tmp_path):
+    sph_("run", naming, "-o", tmp_path / "run", "--set", "time.end=0.05")
+    begin = tmp_path / "run" / "checkpoints" / "checkpoint_000000.h5"
+    history = (tmp_path / "run" / "history.csv").read_bytes()
+    refused = sph_("restart", begin, "--set", "time.end=0.06")
+    assert refused.exit_code == 2
+    assert (tmp_path / "run" / "history.csv").read_bytes() == history  # nothing was done
+    taken_back = sph_("restart", begin, "--set", "report.reference=", "--set", "time.end=0.02")
+    assert taken_back.exit_code == 0, taken_back.output
+    assert "L1 against the exact solution" in taken_back.stdout
+
+
+def test_a_reference_of_another_problem(naming):
+    other = configuration.from_text('[problem]\nname = "uniform"\n[time]\nend = 0.05\n')
+    config = other.override(["report.reference=n=800"])
+    with pytest.raises(ConfigError, match=r"has problem\.name = shock_tube, but this run has"):
+        check(config, None)
+
+
+def test_a_run_whose_reference_goes_meanwhile_keeps_its_summary(naming, tubes, tmp_path):
+    config = configuration.load(naming).override([f"report.reference={tmp_path / 'gone'}"])
+    run = RunDirectory.create(tmp_path / "run")
+    with pytest.raises(FileError, match="gone does not exist"):
+        runner.run(config, run, Lines())
+    found = json.loads(run.summary.read_text())
+    assert (found["status"], found["errors"]) == ("done", None)

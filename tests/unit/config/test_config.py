@@ -135,7 +135,7 @@ def test_resolved_text_names_every_key_in_its_order():
     text = default().to_toml()
     keys = [line.split(" = ")[0] for line in text.splitlines() if " = " in line]
     sections = [default().problem, default().physics, default().time, default().output]
-    sections.append(default().run)
+    sections += [default().report, default().run]
     declared = [
         key
         for section in sections
