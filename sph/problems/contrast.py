@@ -24,6 +24,7 @@ class Problem(base.Problem):
     defaults: ClassVar = {
         "physics.gamma": 5.0 / 3.0,
         "physics.alpha": 1.0,
+        "physics.density": "number",
         "time.end": 0.005,
         "output.interval": 0.001,
     }
