@@ -55,8 +55,12 @@ def _relative_error(tube: Tube) -> float:
 
 
 def _plateaus(tube: Tube, star: riemann.Star, speed: riemann.WaveSpeeds) -> dict[str, float]:
-    """The outer fifth of a plateau, a tenth at either end, is left out: waves are smeared there."""
+    """The outer fifth of a plateau, a tenth at either end, is left out: waves are smeared there.
+
+    Velocities are over the larger of both waves' changes of it, which no frame of reference alters.
+    """
     figures = {}
+    change = max(abs(star.velocity - state.velocity) for state in tube.states)
     for side, start, end, density in (
         ("left", speed.left_tail, speed.contact, star.density_left),
         ("right", speed.contact, speed.right_tail, star.density_right),
@@ -66,13 +70,13 @@ def _plateaus(tube: Tube, star: riemann.Star, speed: riemann.WaveSpeeds) -> dict
         inside = tube.region & (low < tube.x) & (tube.x < high)
         if not inside.any():
             continue
-        for name, truth in (
-            ("density", density),
-            ("velocity", star.velocity),
-            ("pressure", star.pressure),
+        for name, truth, scale in (
+            ("density", density, density),
+            ("velocity", star.velocity, change or 1.0),
+            ("pressure", star.pressure, abs(star.pressure)),
         ):
             error = float(np.median(getattr(tube, name)[inside])) - truth
-            figures[f"plateau_{side}_{name}_error"] = error / abs(truth) if truth else error
+            figures[f"plateau_{side}_{name}_error"] = error / scale if scale else error
     return figures
 
 

@@ -183,9 +183,10 @@ class Problem(base.Problem):
         """What the profile shows beside the exact one, over the region of the errors.
 
         peak_density; density_L1_relative: sum V |error| over sum V exact; plateau_*: the median of
-        each star state over exact, minus 1; shock_left_error, shock_right_error: distance that a
-        shock has run in the gas ahead over exact, minus 1; contact_energy_excess: the largest u
-        over exact between the outer waves, minus 1, which is heat that gas keeps from the start.
+        each star state over exact, minus 1 (of velocity, over its change); shock_left_error and
+        shock_right_error: way that a shock has run in the gas ahead over exact, minus 1;
+        contact_energy_excess: the largest u over exact between the outer waves, minus 1, which is
+        heat that gas keeps from the start.
         """
         exact = self.exact(eos, time, particles.position)
         if exact is None:
