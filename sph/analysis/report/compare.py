@@ -35,8 +35,12 @@ class Question(NamedTuple):
 
 
 class Series(NamedTuple):
-    """Runs with errors that share their settings but N, in order of N: one line of a picture."""
+    """Runs with errors that share their settings but N, in order of N: one line of a picture.
 
+    Where several sweeps are compared, a line is of one of them.
+    """
+
+    sweep: str  # empty where there is one
     label: str
     group: str  # lines of one group, by --by, have one colour
     members: tuple[int, ...]  # indices into the report's compared rows
@@ -62,24 +66,41 @@ def compare(rows: Sequence[Row], question: Question) -> Report:
     """The report on these runs."""
     errors = {id(row): row.error(question.field, question.norm) for row in rows}
     is_compared = {id(row): row.status == "done" and errors[id(row)] is not None for row in rows}
-    keys = varied_keys([row for row in rows if row.settings])
-    lines, groups = _line_keys(keys, question.by)
-    compared = sorted((row for row in rows if is_compared[id(row)]), key=lambda row: row.n)
-    members: dict[tuple[str, ...], list[Row]] = {}
-    for row in compared:
-        members.setdefault(_values(row, lines), []).append(row)
-    found = [members[values] for values in sorted(members, key=lambda one: [*map(natural, one)])]
-    ordered = [row for line in found for row in line]
+    found = []
+    for sweep in dict.fromkeys(row.sweep for row in rows):
+        of_it = [row for row in rows if row.sweep == sweep and row.settings]
+        found += _lines(
+            [row for row in of_it if is_compared[id(row)]], varied_keys(of_it), question
+        )
+    ordered = [row for line in found for row in line.rows]
     error = np.array([errors[id(row)] for row in ordered])
     cost = np.array([row.cost[question.cost] for row in ordered], dtype=float)
     series, start = [], 0
     for line in found:
-        which = np.arange(start, start := start + len(line))
-        label, group = _label(line[0], lines), _label(line[0], groups)
-        series.append(_series(label, group, which, line, error, cost))
+        which = np.arange(start, start := start + len(line.rows))
+        series.append(_series(line, which, error, cost))
+    keys = varied_keys([row for row in rows if row.settings])
     without = [row for row in rows if not is_compared[id(row)]]
     best, excess = front.on_front(cost, error), front.excess(cost, error)
     return Report(question, keys, ordered, error, cost, best, excess, series, without)
+
+
+class _Line(NamedTuple):
+    """Runs that make a series."""
+
+    label: str
+    group: str
+    rows: list[Row]
+
+
+def _lines(rows: list[Row], keys: list[str], question: Question) -> list[_Line]:
+    """The lines of one sweep, or of all runs, in the order of their settings."""
+    lines, groups = _line_keys(keys, question.by)
+    members: dict[tuple[str, ...], list[Row]] = {}
+    for row in sorted(rows, key=lambda row: row.n):
+        members.setdefault(tuple(row.value(key) for key in lines), []).append(row)
+    found = [members[values] for values in sorted(members, key=lambda one: [*map(natural, one)])]
+    return [_Line(_label(one[0], lines), _label(one[0], groups), one) for one in found]
 
 
 def _line_keys(keys: list[str], by: Sequence[str]) -> tuple[list[str], list[str]]:
@@ -90,22 +111,19 @@ def _line_keys(keys: list[str], by: Sequence[str]) -> tuple[list[str], list[str]
     return [*lines, *(key for key in by if key not in lines)], list(by) or lines
 
 
-def _values(row: Row, keys: Sequence[str]) -> tuple[str, ...]:
-    return tuple(row.value(key) for key in keys)
-
-
 def _label(row: Row, keys: Sequence[str]) -> str:
     """Settings without their tables, e.g. alpha = 1.0."""
     names = {key: "problem" if key == "problem.name" else key.rpartition(".")[2] for key in keys}
     return ", ".join(f"{name} = {row.value(key)}" for key, name in names.items())
 
 
-def _series(label, group, which, line, error, cost) -> Series:
-    number = np.array([row.n for row in line], dtype=float)
+def _series(line: _Line, which, error, cost) -> Series:
+    number = np.array([row.n for row in line.rows], dtype=float)
     by_number = front.slope(number, error[which])
-    dimensions = {row.summary["dimension"] for row in line}
+    dimensions = {row.summary["dimension"] for row in line.rows}
     order = None
     if by_number is not None and len(dimensions) == 1:
         order = -by_number * dimensions.pop()
     exponent = front.slope(cost[which], error[which])
-    return Series(label, group, tuple(which.tolist()), order, exponent)
+    members = tuple(which.tolist())
+    return Series(line.rows[0].sweep, line.label, line.group, members, order, exponent)

@@ -28,6 +28,7 @@ class Row:
     status: str  # "done", "stopped", "failed" or "unfinished"
     reason: str = ""
     reference: dict | None = None  # errors against a named run, in place of the summary's own
+    sweep: str = ""  # which of several sweeps it is of
     n: int = field(init=False)
     cost: dict[str, float] = field(init=False)  # by the names of --x
 
@@ -78,17 +79,24 @@ class Row:
 
 
 def read(sources: Sequence[Path]) -> list[Row]:
-    """The runs that are or lie in these directories. Raises FileError where there are none."""
+    """The runs that are or lie in these directories. Raises FileError where there are none.
+
+    Of more than one sweep, each row has the name of its own.
+    """
     rows: dict[Path, Row] = {}
-    for source in map(Path, sources):
+    sources = list(dict.fromkeys(map(Path, sources)))
+    sweeps = [source for source in sources if SweepDirectory(source).is_one]
+    for source in sources:
         found = _runs_in(source)
-        rows |= {path.resolve(): _row(path) for path in found}
-        sweep = SweepDirectory(source)
-        if sweep.is_one:
-            rows |= _never_begun(sweep)
+        mine = {path.resolve(): _row(path) for path in found}
+        if source in sweeps:
+            mine |= _never_begun(SweepDirectory(source))
+            for row in mine.values() if len(sweeps) > 1 else ():
+                row.sweep = source.resolve().name
         elif not found:
             there = "holds no runs" if source.is_dir() else "does not exist"
             raise FileError(f"{source} {there}.\nTry: a run directory, or one that holds some.")
+        rows |= mine
     found = list(rows.values())
     _shorten_models(found)
     return found

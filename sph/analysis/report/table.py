@@ -49,6 +49,7 @@ def as_json(report: Report, sentences: Sequence[str]) -> str:
     reference = report.question.reference
     series = [
         {
+            "sweep": line.sweep,
             "label": line.label,
             "runs": [runs[i] for i in line.members],
             "order": line.order,
@@ -70,12 +71,14 @@ def _cells(report: Report) -> list[list[str]]:
     """Header and lines of what is shown."""
     shown = [key for key in report.keys if key != RESOLUTION]
     question = report.question
-    header = [*shown, "N", "steps"]
+    several = len({line.sweep for line in report.series}) > 1
+    header = [*(["sweep"] if several else []), *shown, "N", "steps"]
     header += [] if question.cost == "n" else [COSTS[question.cost][1]]
     header += [question.error_name, "energy drift", "against the front"]
     lines = []
     for i, row in enumerate(report.rows):
-        line = [*(row.value(key) for key in shown), str(row.n), str(row.steps)]
+        line = [row.sweep] if several else []
+        line += [*(row.value(key) for key in shown), str(row.n), str(row.steps)]
         line += [] if question.cost == "n" else [f"{report.cost[i]:.3g}"]
         drift = row.summary["conservation"]["energy_drift_max"]
         drifted = f"{drift:.1e}" if isinstance(drift, float) else str(drift)
@@ -97,7 +100,8 @@ def _records(report: Report) -> list[dict]:
 
 
 def _record(report: Report, row: Row) -> dict:
-    record = {"run": row.name, "status": row.status, "reason": row.reason}
+    record = {"sweep": row.sweep} if row.sweep else {}
+    record |= {"run": row.name, "status": row.status, "reason": row.reason}
     record |= {key: row.value(key) for key in report.keys}
     if not row.summary:
         return record

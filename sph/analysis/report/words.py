@@ -87,7 +87,9 @@ def _warnings(report: Report) -> list[str]:
 
 
 def _name(line: Series) -> str:
-    return line.label or "These runs"
+    """Its label, with its sweep unless that is named like what it varies."""
+    sweep = "" if line.label.startswith(f"{line.sweep} = ") else line.sweep
+    return ": ".join(filter(None, [sweep, line.label])) or "These runs"
 
 
 def _resolutions(report: Report, members: list[int]) -> str:

@@ -1,0 +1,240 @@
+"""The standing studies: which settings are worth their time, problem by problem.
+
+    python scripts/study.py                    what there is
+    python scripts/study.py sod gresho         runs what is missing of these, and reports
+    python scripts/study.py all --jobs 2
+
+A study is a few calls of `sph sweep`, one for each thing that is varied, and one of `sph report`
+over them; all are printed. Runs go to runs/studies/NAME, which may be deleted, and the report with
+what it was made by to docs/studies/NAME. Run again, a study does only what is missing.
+"""
+
+import argparse
+import platform
+import shlex
+import subprocess
+import sys
+from importlib.metadata import version
+from pathlib import Path
+from typing import NamedTuple
+
+HOME = Path(__file__).resolve().parent.parent
+RUNS = Path("runs/studies")
+RESULTS = Path("docs/studies")
+PACKAGES = ("numba", "llvmlite", "numpy")
+
+
+class Study(NamedTuple):
+    """A problem, and what is varied of it beside N."""
+
+    config: str
+    n: str  # numbers of particles, as --vary takes them
+    report: tuple[str, ...]  # options of `sph report`
+    sweeps: dict[str, tuple[str, ...]]  # by name: further --vary
+    fixed: tuple[str, ...] = ()  # --set of all sweeps
+    reference: tuple[str, ...] = ()  # --set of the finer run that errors are taken against
+    reference_n: str = ""  # and its particles
+    pictures: tuple[str, ...] = ()  # runs to draw side by side, SWEEP/POINT
+
+
+SCHEME = ("physics.scheme=grad_h,variational,pressure_energy",)
+KERNEL = ("physics.kernel=cubic_spline,quintic_spline,wendland_c2,wendland_c4,wendland_c6",)
+PASSES = ('physics.density_passes=1,2,"converged"',)
+SWITCH = "{min = 0.1, max = 2.0}"
+
+STUDIES = {
+    "sod": Study(
+        "configs/sod.toml",
+        "200:3200:x2",
+        ("--field", "density"),
+        {
+            "scheme": SCHEME,
+            "kernel": KERNEL,
+            "eta": ("physics.eta=1.2,1.6,2.0,2.4",),
+            "alpha": (f"physics.alpha=0.5,1.0,2.0,{SWITCH}",),
+            "C": ("physics.C=0.1,0.15,0.3,0.5",),
+            "density_passes": PASSES,
+        },
+    ),
+    "strong_shock": Study(
+        "configs/strong_shock.toml",
+        "250:2000:x2",
+        ("--field", "density"),
+        {
+            "scheme": SCHEME,
+            "kernel": KERNEL,
+            "eta": ("physics.eta=1.2,1.6,2.0,2.4",),
+            "alpha": (f"physics.alpha=0.5,1.0,2.0,{SWITCH}",),
+            "C": ("physics.C=0.1,0.15,0.3,0.5",),
+            "density_passes": PASSES,
+        },
+    ),
+    "point_explosion": Study(
+        "configs/point_explosion.toml",
+        "4096,13824,32768",
+        ("--field", "density"),
+        {
+            "scheme": SCHEME,
+            "kernel": ("physics.kernel=cubic_spline,wendland_c2,wendland_c4",),
+            "eta": ("physics.eta=1.1,1.2,1.4,1.6",),
+            "alpha": ("physics.alpha=1.0,1.5,3.0,{min = 0.1, max = 3.0}",),
+            "C": ("physics.C=0.1,0.15,0.3",),
+            "density_passes": PASSES,
+        },
+        ("physics.energy_limit=false",),
+    ),
+    "kelvin_helmholtz_smooth": Study(
+        "configs/kelvin_helmholtz_smooth.toml",
+        "1024,2304,4096,9216",
+        ("--field", "velocity"),
+        {
+            "scheme": SCHEME,
+            "kernel_and_eta": ("physics.kernel=wendland_c2,wendland_c4", "physics.eta=1.6,2.4"),
+            "alpha": (f"physics.alpha=0.1,0.5,1.0,{SWITCH}",),
+            "balsara": ("physics.balsara=true,false",),
+            "C": ("physics.C=0.15,0.3,0.5",),
+            "density_passes": PASSES,
+        },
+        reference=(
+            "physics.kernel=wendland_c4",
+            "physics.eta=2.2",
+            "physics.alpha=0.5",
+        ),
+        reference_n="65536",
+    ),
+    "gresho": Study(
+        "configs/gresho.toml",
+        "1024,2304,4096",
+        ("--field", "report.error_v_phi"),
+        {
+            "scheme": SCHEME,
+            "kernel": KERNEL,
+            "eta": ("physics.eta=1.6,2.2,3.0,3.8",),
+            "alpha": ("physics.alpha=0.1,0.5,1.0,{min = 0.1, max = 2.0}",),
+            "C": ("physics.C=0.15,0.3,0.5",),
+            "density_passes": PASSES,
+        },
+    ),
+    "sound_wave": Study(
+        "configs/sound_wave.toml",
+        "32:512:x2",
+        ("--field", "report.error_velocity_relative"),
+        {
+            "scheme": SCHEME,
+            "kernel": KERNEL,
+            "eta": ("physics.eta=1.2,1.6,2.0,2.4",),
+            "balsara_and_alpha": (
+                f"physics.alpha=0.5,1.0,{SWITCH}",
+                "physics.balsara=true,false",
+            ),
+            "C": ("physics.C=0.15,0.3,0.5",),
+            "density_passes": PASSES,
+        },
+    ),
+    "sound_wave_2d": Study(
+        "configs/sound_wave.toml",
+        "256,1024,4096",
+        ("--field", "report.error_velocity_relative"),
+        {
+            "eta_of_Wendland_C2": ("physics.eta=1.2,1.6,2.4,3.2",),
+            "eta_of_Wendland_C4": ("physics.kernel=wendland_c4", "physics.eta=1.6,2.4,3.2,4.0"),
+        },
+        ("problem.dimension=2",),
+    ),
+    "square": Study(
+        "configs/square.toml",
+        "448,1792",
+        ("--field", "report.shape_error"),
+        {
+            "scheme": SCHEME,
+            "pressure_energy_kernel": (
+                "physics.scheme=pressure_energy",
+                "physics.kernel=wendland_c2,wendland_c4,wendland_c6",
+                "physics.eta=1.6,2.4",
+            ),
+            "pressure_energy_alpha": (
+                "physics.scheme=pressure_energy",
+                "physics.alpha=0.1,1.0,3.0",
+            ),
+        },
+        pictures=tuple(
+            f"scheme/problem.n=1792,physics.scheme={scheme}"
+            for scheme in ("grad_h", "variational", "pressure_energy")
+        ),
+    ),
+}
+
+
+def commands(name: str, jobs: int) -> list[list[str]]:
+    """What a study calls, in order."""
+    study = STUDIES[name]
+    runs, results = RUNS / name, RESULTS / name
+
+    def sweep(called: str, fixed: tuple[str, ...], varies: tuple[str, ...]) -> list[str]:
+        sets = [part for one in fixed for part in ("--set", one)]
+        vary = [part for one in varies for part in ("--vary", one)]
+        ending = ["--jobs", str(jobs), "-o", str(runs / called)]
+        return ["sph", "sweep", study.config, *sets, *vary, *ending]
+
+    called = [
+        sweep(one, study.fixed, (f"problem.n={study.n}", *varies))
+        for one, varies in study.sweeps.items()
+    ]
+    options = [*study.report, "-o", str(results)]
+    if study.reference:
+        finest = f"problem.n={study.reference_n}"
+        called.append(sweep("reference", study.reference, (finest,)))
+        options += ["--reference", str(runs / "reference" / finest)]
+    called.append(["sph", "report", *(str(runs / one) for one in study.sweeps), *options])
+    if study.pictures:
+        drawn = [str(runs / one) for one in study.pictures]
+        called.append(["sph", "plot", *drawn, "-o", str(results / "runs.png")])
+    return called
+
+
+def carry_out(name: str, jobs: int) -> None:
+    """Run a study, and write what it was made by."""
+    called = commands(name, jobs)
+    for command in called:
+        print("$", shlex.join(command), flush=True)
+        subprocess.run([sys.executable, "-m", "sph.cli", *command[1:]], cwd=HOME, check=True)
+    lines = "\n".join(map(shlex.join, called))
+    (HOME / RESULTS / name / "made_by.md").write_text(
+        f"# How this was made\n\n`python scripts/study.py {name}` called\n\n```sh\n{lines}\n```\n\n"
+        f"{machine()}\n",
+        encoding="utf-8",
+    )
+
+
+def machine() -> str:
+    """Processor, cores and versions in a sentence."""
+    listed = Path("/proc/cpuinfo")
+    names = [
+        line.partition(":")[2].strip()
+        for line in (listed.read_text().splitlines() if listed.is_file() else [])
+        if line.startswith("model name")
+    ]
+    processor = f"{len(names)} cores of {names[0]}" if names else platform.processor()
+    packages = ", ".join(f"{package} {version(package)}" for package in PACKAGES)
+    return (
+        f"{processor}; {platform.system()}, Python {platform.python_version()}, {packages}. "
+        "Other work ran on the same cores, so seconds are good for ratios within a sweep only."
+    )
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
+    parser.add_argument("names", nargs="*", metavar="NAME", help=", ".join([*STUDIES, "all"]))
+    parser.add_argument("--jobs", type=int, default=1, metavar="N", help="runs at once")
+    given = parser.parse_args()
+    unknown = [name for name in given.names if name not in (*STUDIES, "all")]
+    if unknown or not given.names:
+        print(*(f"no study is called {name}" for name in unknown), sep="\n", end="")
+        print("studies:", ", ".join([*STUDIES, "all"]))
+        sys.exit(2 if unknown else 0)
+    for name in STUDIES if "all" in given.names else given.names:
+        carry_out(name, given.jobs)
+
+
+if __name__ == "__main__":
+    main()
