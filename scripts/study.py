@@ -33,25 +33,29 @@ class Study(NamedTuple):
     sweeps: dict[str, tuple[str, ...]]  # by name: further --vary
     fixed: tuple[str, ...] = ()  # --set of all sweeps
     reference: tuple[str, ...] = ()  # --set of the finer run that errors are taken against
-    reference_n: str = ""  # and its particles
+    reference_n: str = ""  # and its numbers of particles: the last is that run
     pictures: tuple[str, ...] = ()  # runs to draw side by side, SWEEP/POINT
 
 
 SCHEME = ("physics.scheme=grad_h,variational,pressure_energy",)
 KERNEL = ("physics.kernel=cubic_spline,quintic_spline,wendland_c2,wendland_c4,wendland_c6",)
+ETA = ("physics.eta=1.2,1.6,2.0,2.4",)
 PASSES = ('physics.density_passes=1,2,"converged"',)
-SWITCH = "{min = 0.1, max = 2.0}"
+MORRIS_MONAGHAN = "{min = 0.1, max = 2.0}"
+CULLEN_DEHNEN = '{min = 0.02, max = 2.0, switch = "cullen_dehnen"}'
+SWITCHES = f"{MORRIS_MONAGHAN},{CULLEN_DEHNEN}"
+WITHOUT_BALSARA = (f"physics.alpha=0.5,1.0,{CULLEN_DEHNEN}", "physics.balsara=false")
 
 STUDIES = {
     "sod": Study(
         "configs/sod.toml",
-        "200:3200:x2",
+        "200:1600:x2",
         ("--field", "density"),
         {
             "scheme": SCHEME,
             "kernel": KERNEL,
-            "eta": ("physics.eta=1.2,1.6,2.0,2.4",),
-            "alpha": (f"physics.alpha=0.5,1.0,2.0,{SWITCH}",),
+            "eta": ETA,
+            "alpha": (f"physics.alpha=0.5,1.0,2.0,{SWITCHES}",),
             "C": ("physics.C=0.1,0.15,0.3,0.5",),
             "density_passes": PASSES,
         },
@@ -62,10 +66,10 @@ STUDIES = {
         ("--field", "density"),
         {
             "scheme": SCHEME,
-            "kernel": KERNEL,
-            "eta": ("physics.eta=1.2,1.6,2.0,2.4",),
-            "alpha": (f"physics.alpha=0.5,1.0,2.0,{SWITCH}",),
-            "C": ("physics.C=0.1,0.15,0.3,0.5",),
+            "kernel": ("physics.kernel=cubic_spline,wendland_c2,wendland_c4,wendland_c6",),
+            "eta": ETA,
+            "alpha": (f"physics.alpha=1.0,2.0,3.0,{SWITCHES}",),
+            "C": ("physics.C=0.1,0.15,0.3",),
             "density_passes": PASSES,
         },
     ),
@@ -75,32 +79,26 @@ STUDIES = {
         ("--field", "density"),
         {
             "scheme": SCHEME,
-            "kernel": ("physics.kernel=cubic_spline,wendland_c2,wendland_c4",),
             "eta": ("physics.eta=1.1,1.2,1.4,1.6",),
-            "alpha": ("physics.alpha=1.0,1.5,3.0,{min = 0.1, max = 3.0}",),
+            "alpha": (f"physics.alpha=1.0,1.5,3.0,{SWITCHES}",),
             "C": ("physics.C=0.1,0.15,0.3",),
-            "density_passes": PASSES,
         },
         ("physics.energy_limit=false",),
     ),
     "kelvin_helmholtz_smooth": Study(
         "configs/kelvin_helmholtz_smooth.toml",
-        "1024,2304,4096,9216",
+        "1024,2304,4096",
         ("--field", "velocity"),
         {
             "scheme": SCHEME,
             "kernel_and_eta": ("physics.kernel=wendland_c2,wendland_c4", "physics.eta=1.6,2.4"),
-            "alpha": (f"physics.alpha=0.1,0.5,1.0,{SWITCH}",),
-            "balsara": ("physics.balsara=true,false",),
+            "alpha": ("physics.alpha=0.1,0.5,1.0",),
+            "alpha_without_balsara": WITHOUT_BALSARA,
             "C": ("physics.C=0.15,0.3,0.5",),
             "density_passes": PASSES,
         },
-        reference=(
-            "physics.kernel=wendland_c4",
-            "physics.eta=2.2",
-            "physics.alpha=0.5",
-        ),
-        reference_n="65536",
+        reference=("physics.kernel=wendland_c4", "physics.eta=2.2", "physics.alpha=0.5"),
+        reference_n="4096,9216,16384,65536",
     ),
     "gresho": Study(
         "configs/gresho.toml",
@@ -110,9 +108,9 @@ STUDIES = {
             "scheme": SCHEME,
             "kernel": KERNEL,
             "eta": ("physics.eta=1.6,2.2,3.0,3.8",),
-            "alpha": ("physics.alpha=0.1,0.5,1.0,{min = 0.1, max = 2.0}",),
+            "alpha": (f"physics.alpha=0.1,0.5,1.0,{MORRIS_MONAGHAN}",),
+            "alpha_without_balsara": WITHOUT_BALSARA,
             "C": ("physics.C=0.15,0.3,0.5",),
-            "density_passes": PASSES,
         },
     ),
     "sound_wave": Study(
@@ -120,15 +118,10 @@ STUDIES = {
         "32:512:x2",
         ("--field", "report.error_velocity_relative"),
         {
-            "scheme": SCHEME,
             "kernel": KERNEL,
-            "eta": ("physics.eta=1.2,1.6,2.0,2.4",),
-            "balsara_and_alpha": (
-                f"physics.alpha=0.5,1.0,{SWITCH}",
-                "physics.balsara=true,false",
-            ),
+            "eta": ETA,
+            "alpha_without_balsara": (f"physics.alpha=0.5,1.0,{SWITCHES}", "physics.balsara=false"),
             "C": ("physics.C=0.15,0.3,0.5",),
-            "density_passes": PASSES,
         },
     ),
     "sound_wave_2d": Study(
@@ -182,9 +175,9 @@ def commands(name: str, jobs: int) -> list[list[str]]:
     ]
     options = [*study.report, "-o", str(results)]
     if study.reference:
-        finest = f"problem.n={study.reference_n}"
-        called.append(sweep("reference", study.reference, (finest,)))
-        options += ["--reference", str(runs / "reference" / finest)]
+        called.append(sweep("reference", study.reference, (f"problem.n={study.reference_n}",)))
+        finest = study.reference_n.rpartition(",")[2]
+        options += ["--reference", str(runs / "reference" / f"problem.n={finest}")]
     called.append(["sph", "report", *(str(runs / one) for one in study.sweeps), *options])
     if study.pictures:
         drawn = [str(runs / one) for one in study.pictures]

@@ -71,14 +71,16 @@ class Problem(base.Problem):
         """Shape of the dense gas.
 
         squareness: sum r^4 cos 4 phi / sum r^4 of the dense particles, relative to that of a
-        square: 1 as long as it is one, 0 for a disc, negative for a diamond. dense_outside: the
-        share of them that is outside the square.
+        square: 1 as long as it is one, 0 for a disc, negative for a diamond. shape_error: how far
+        it is from 1. dense_outside: the share of them that is outside the square.
         """
         dense = particles.position[:, particles.id <= self._cells() ** 2]
         outside = np.abs(dense).max(axis=0) > HALF
         start = _fourfold(self._dense_lattice())
+        squareness = _fourfold(dense) / start
         return {
-            "squareness": _fourfold(dense) / start,
+            "squareness": squareness,
+            "shape_error": abs(1.0 - squareness),
             "dense_outside": float(outside.mean()),
         }
 
