@@ -191,6 +191,7 @@ def carry_out(name: str, jobs: int) -> None:
     for command in called:
         print("$", shlex.join(command), flush=True)
         subprocess.run([sys.executable, "-m", "sph.cli", *command[1:]], cwd=HOME, check=True)
+    (HOME / RESULTS / name / "report.json").unlink()  # the same as report.csv, at thrice the size
     lines = "\n".join(map(shlex.join, called))
     (HOME / RESULTS / name / "made_by.md").write_text(
         f"# How this was made\n\n`python scripts/study.py {name}` called\n\n```sh\n{lines}\n```\n\n"

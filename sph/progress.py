@@ -1,4 +1,4 @@
-"""Progress of a run: a bar with the time left on a terminal, plain lines elsewhere."""
+"""Progress of a run or a sweep: a bar with the time left on a terminal, plain lines elsewhere."""
 
 import os
 import sys
@@ -72,11 +72,51 @@ class Bar(Lines):
             self._bar.close()
 
 
+class PointLines:
+    """A line for each point of a sweep that has ended."""
+
+    def note(self, text):
+        print(text, file=sys.stderr, flush=True)
+
+    def ended(self, count): ...
+
+    def close(self): ...
+
+
+class PointBar(PointLines):
+    """The same above a bar over the points."""
+
+    FORMAT = "{percentage:3.0f}%|{bar}| {n_fmt} of {total_fmt} points [{elapsed}, {remaining} left]"
+
+    def __init__(self, points, ended):
+        import tqdm
+
+        # what an earlier call has done says nothing of the pace of this one
+        self._bar = tqdm.tqdm(total=points, initial=ended, bar_format=self.FORMAT, leave=False)
+
+    def note(self, text):
+        self._bar.write(text, file=sys.stderr)
+
+    def ended(self, count):
+        self._bar.update(count - self._bar.n)
+
+    def close(self):
+        self._bar.close()
+
+
 def suited():
     """A bar where someone is watching a terminal, lines otherwise."""
+    return Bar() if _is_watched() else Lines()
+
+
+def suited_to_points(points, ended):
+    """The same for a sweep of so many points, of which so many have ended."""
+    return PointBar(points, ended) if _is_watched() else PointLines()
+
+
+def _is_watched():
     try:
         # some pseudo-terminals have no width, and no bar would show on them
-        watched = sys.stderr.isatty() and os.get_terminal_size(sys.stderr.fileno()).columns > 0
+        return sys.stderr.isatty() and os.get_terminal_size(sys.stderr.fileno()).columns > 0
     except OSError:
-        watched = False
-    return Bar() if watched else Lines()
+        return False

@@ -1,9 +1,9 @@
 """A sweep from its command line to its closing words."""
 
-import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
+from sph import progress
 from sph.errors import ConfigError, NumericalError, Stopped
 from sph.sweep import distributed, local, slurm
 from sph.sweep.manifest import SweepDirectory
@@ -35,7 +35,10 @@ def run(
     everything = tasks(sweep, plan)
     missing = [task for task in everything if task.status != "done"]
     told = _Told(len(everything), len(everything) - len(missing))
-    _runner(jobs, scheduler, slurm_options)(missing, told)
+    try:
+        _runner(jobs, scheduler, slurm_options)(missing, told)
+    finally:
+        told.shown.close()
     return told.closing()
 
 
@@ -53,8 +56,9 @@ class _Told:
     def __init__(self, points: int, before: int):
         self.points, self.before = points, before
         self.outcomes: list[Outcome] = []
+        self.shown = progress.suited_to_points(points, before)
         if before:
-            self._say(f"{before} of {points} points are done already")
+            self.shown.note(f"{before} of {points} points are done already")
 
     def __call__(self, outcome: Outcome) -> None:
         self.outcomes.append(outcome)
@@ -63,7 +67,8 @@ class _Told:
         reason = f": {outcome.reason}" if outcome.reason else ""
         status = MARKS[outcome.status]
         width = len(str(self.points))
-        self._say(f"[{ended:{width}d}/{self.points}] {outcome.name} {status}{how}{reason}")
+        self.shown.note(f"[{ended:{width}d}/{self.points}] {outcome.name} {status}{how}{reason}")
+        self.shown.ended(ended)
 
     def closing(self) -> str:
         """Raises NumericalError or Stopped where not all points are done."""
@@ -75,9 +80,6 @@ class _Told:
         if lists["stopped"]:
             raise Stopped(f"{done}; the same command goes on with the rest.")
         return f"{done}."
-
-    def _say(self, line: str) -> None:
-        print(line, file=sys.stderr, flush=True)
 
 
 def _first_line(outcome: Outcome) -> str:

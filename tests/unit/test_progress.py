@@ -18,6 +18,8 @@ import pytest
 
 import sph
 from sph import progress
+from sph.sweep import command
+from sph.sweep.task import Outcome
 
 ROOT = Path(sph.__file__).parents[1]
 TUBE = """\
@@ -113,6 +115,21 @@ def test_bar_that_never_started_closes():
     progress.Bar().close()
 
 
+def test_a_sweeps_bar_counts_points_and_keeps_lines_whole(monkeypatch):
+    stream = io.StringIO()
+    monkeypatch.setattr(sys, "stderr", stream)
+    bar = progress.PointBar(4, 1)
+    bar.note("[2/4] b done")
+    bar.ended(2)
+    bar._bar.refresh()
+    bar.close()
+    shown = stream.getvalue()
+    assert " 25%|" in shown
+    assert "1 of 4 points" in shown
+    assert re.search(r" 50%\|.*\| 2 of 4 points \[00:0\d, .* left\]", shown)
+    assert re.search(r"(^|[\r\n] *)\[2/4\] b done\n", shown)
+
+
 def on_terminal(monkeypatch, columns):
     monkeypatch.setattr(sys, "stderr", SimpleNamespace(isatty=lambda: True, fileno=lambda: 2))
     monkeypatch.setattr(os, "get_terminal_size", lambda descriptor: os.terminal_size((columns, 24)))
@@ -124,6 +141,19 @@ def test_which_is_suited(monkeypatch):
     assert type(progress.suited()) is progress.Bar
     on_terminal(monkeypatch, 0)
     assert type(progress.suited()) is progress.Lines
+    assert type(progress.suited_to_points(2, 0)) is progress.PointLines
+
+
+def test_a_sweep_on_a_terminal_shows_a_bar(monkeypatch):
+    stream = io.StringIO()
+    stream.isatty, stream.fileno = lambda: True, lambda: 2
+    monkeypatch.setattr(sys, "stderr", stream)
+    monkeypatch.setattr(os, "get_terminal_size", lambda descriptor: os.terminal_size((80, 24)))
+    told = command._Told(2, 0)
+    told(Outcome("one", "done"))
+    told.shown.close()
+    assert "[1/2] one done\n" in stream.getvalue()
+    assert " of 2 points" in stream.getvalue()
 
 
 def test_a_run_on_a_terminal_shows_a_bar_and_keeps_stdout_for_the_summary(tmp_path):

@@ -343,6 +343,54 @@ def test_the_pictures_hold_the_runs(study):
     assert np.sum(list(widths.values()), axis=0) == pytest.approx([100.0] * 6)
 
 
+def sweep_of(path, alphas, factor):
+    """A directory of a sweep over alpha, errors and costs as in `study`, cost times `factor`."""
+    vary = ["problem.n=100,200", f"physics.alpha={alphas}"]
+    (path.parent / "tube.toml").write_text('[problem]\nname = "shock_tube"\n')
+    plan = Plan.of(vary)
+    SweepDirectory(path).prepare(path.parent / "tube.toml", plan)
+    for point in plan.points:
+        n = int(point.settings[0].partition("=")[2])
+        write_run(path / point.name, 100 / n, factor * (n / 100) ** 2, point.settings)
+    return path
+
+
+def test_several_sweeps_have_a_panel_each(tmp_path):
+    from sph.analysis.figures import report as pictures
+
+    first = sweep_of(tmp_path / "alpha", "1.0,2.0", 1.0)
+    second = sweep_of(tmp_path / "wide", "1.0,{min = 0.1, max = 2.0}", 3.0)
+    report = compared(first, second)
+    # the same setting in both stays apart, since their times may have been taken in other company
+    found = [(line.sweep, line.label) for line in report.series]
+    assert found[:3] == [
+        ("alpha", "alpha = 1.0"),
+        ("alpha", "alpha = 2.0"),
+        ("wide", "alpha = 1.0"),
+    ]
+    assert found[3][1].startswith("alpha = {")
+    assert "\nalpha = 1.0: order 1.00" in said(report)
+    assert "\nwide: alpha = 1.0: order 1.00" in said(report)
+    panels = pictures.error_against_cost(report).axes
+    assert [panel.get_title() for panel in panels] == ["alpha", "wide"]
+    drawn = {line.get_label(): line.get_xdata().tolist() for line in panels[1].lines}
+    assert drawn["Pareto front"] == [1.0, 1.0, 4.0, 4.0]  # of all: two lines of the first
+    (switched,) = (label for label in drawn if "0.1 to 2.0" in label)
+    assert drawn[switched] == [3.0, 12.0]
+    assert CliRunner().invoke(main, ["report", str(first), str(second)]).exit_code == 0
+    assert "| wide | { min = 0.1, max = 2.0" in (first / "report" / "report.md").read_text()
+
+
+def test_labels_of_pictures():
+    from sph.analysis.figures import report_labels as labels
+
+    assert labels.short("kernel = wendland_c2, eta = 1.6") == r"kernel = wendland c2, $\eta$ = 1.6"
+    table = '{ min = 0.02, max = 2.0, switch = "cullen_dehnen" }'
+    assert labels.short(f"alpha = {table}") == r"$\alpha$ = 0.02 to 2.0 (cullen dehnen)"
+    assert labels.value_alone("scheme = grad_h") == "grad_h"
+    assert labels.value_alone("eta = 1.6") == "eta = 1.6"
+
+
 def test_the_commands_cost_nothing_until_called():
     heavy = {"matplotlib", "h5py", "pydantic", "distributed", "submitit"}
     code = f"import sys, sph.cli_studies; print(*({heavy!r} & set(sys.modules)))"
