@@ -72,7 +72,8 @@ class Watchdog:
                 )
         raise fault(
             simulation,
-            f"the time step came out as {dt}, set by {simulation.limit.criterion}",
+            f"the time step has shrunk to {dt:.3g}, which moves time on no more: "
+            f"{_what_sets(simulation.limit)}",
             SMALLER_STEPS,
             simulation.limit.particle,
         )
@@ -139,8 +140,8 @@ class Watchdog:
         if covered < COLLAPSE * self._longest:
             raise fault(
                 simulation,
-                f"the time step has collapsed to {simulation.limit.dt:.3g}, set by "
-                f"{simulation.limit.criterion}: the last {WINDOW} steps covered {covered:.3g} of "
+                f"the time step has collapsed to {simulation.limit.dt:.3g}: "
+                f"{_what_sets(simulation.limit)}. The last {WINDOW} steps covered {covered:.3g} of "
                 f"time, where {WINDOW} steps of this run have covered {self._longest:.3g}",
                 "physics.energy_limit = false where cold gas sets the step, else a larger "
                 "physics.alpha or more particles",
@@ -148,6 +149,19 @@ class Watchdog:
             )
         self._longest = max(self._longest, covered)
         self._marked = simulation.time, simulation.step
+
+
+def _what_sets(limit) -> str:
+    """The particle and criterion of a step, in words."""
+    if not limit.particle:
+        return "it may not grow faster"
+    by = {
+        "signal_speed": "the speed of its signals",
+        "energy": "u/|du/dt|, how fast it is heated or cooled",
+        "acceleration": "its acceleration",
+        "support": "how fast its support changes",
+    }
+    return f"particle {limit.particle} sets it by {by[limit.criterion]}"
 
 
 def fault(simulation, what: str, remedy: str, particle: int) -> NumericalError:

@@ -115,7 +115,7 @@ def test_a_step_that_collapses(begin, monkeypatch):
         return limit._replace(dt=1e-9 * limit.dt)
 
     monkeypatch.setattr(step_size, "limit", shrunk)
-    with pytest.raises(NumericalError, match=r"the time step has collapsed to .* set by") as caught:
+    with pytest.raises(NumericalError, match=r"time step has collapsed to .* sets it by") as caught:
         run(simulation, math.inf)
     assert "physics.energy_limit = false" in str(caught.value)
     assert simulation.step < 25 + 41  # within two windows
@@ -126,7 +126,7 @@ def test_a_step_too_small_to_move_time(begin, monkeypatch):
     simulation.advance(math.inf)
     allowed = step_size.limit
     monkeypatch.setattr(step_size, "limit", lambda *a: allowed(*a)._replace(dt=1e-30))
-    with pytest.raises(NumericalError, match="the time step came out as 1e-30"):
+    with pytest.raises(NumericalError, match=r"shrunk to 1e-30.* sets it by the speed of its"):
         simulation.advance(math.inf)
 
 
