@@ -62,12 +62,12 @@ STUDIES = {
     ),
     "strong_shock": Study(
         "configs/strong_shock.toml",
-        "250:2000:x2",
+        "250:1000:x2",
         ("--field", "density"),
         {
             "scheme": SCHEME,
             "kernel": ("physics.kernel=cubic_spline,wendland_c2,wendland_c4,wendland_c6",),
-            "eta": ETA,
+            "eta": ("physics.eta=1.2,1.6,2.4",),
             "alpha": (f"physics.alpha=1.0,2.0,3.0,{SWITCHES}",),
             "C": ("physics.C=0.1,0.15,0.3",),
             "density_passes": PASSES,
@@ -79,9 +79,10 @@ STUDIES = {
         ("--field", "density"),
         {
             "scheme": SCHEME,
-            "eta": ("physics.eta=1.1,1.2,1.4,1.6",),
-            "alpha": (f"physics.alpha=1.0,1.5,3.0,{SWITCHES}",),
-            "C": ("physics.C=0.1,0.15,0.3",),
+            "eta": ("physics.eta=1.2,1.4,1.6",),
+            "alpha": (f"physics.alpha=1.0,3.0,{SWITCHES}",),
+            "C": ("physics.C=0.15,0.3",),
+            "density_passes": PASSES,
         },
         ("physics.energy_limit=false",),
     ),
@@ -115,13 +116,14 @@ STUDIES = {
     ),
     "sound_wave": Study(
         "configs/sound_wave.toml",
-        "32:512:x2",
+        "32:256:x2",
         ("--field", "report.error_velocity_relative"),
         {
             "kernel": KERNEL,
             "eta": ETA,
             "alpha_without_balsara": (f"physics.alpha=0.5,1.0,{SWITCHES}", "physics.balsara=false"),
             "C": ("physics.C=0.15,0.3,0.5",),
+            "density_passes": PASSES,
         },
     ),
     "sound_wave_2d": Study(
