@@ -40,7 +40,7 @@ def of_run(simulation, history: dict[str, np.ndarray], status: str, reason: str 
             exact = errors.against_exact(problem, eos, simulation.time, particles, pressure)
             result["errors"] = exact
         report = problem.report(eos, simulation.time, particles, pressure)
-        result["report"] = report | problem.over_time(history)
+        result["report"] = report | problem.over_time(eos, history)
     return result
 
 

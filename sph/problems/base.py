@@ -95,6 +95,10 @@ class Problem(Section):
         """Further figures of the summary at the end of a run, e.g. a shock's radius."""
         return {}
 
-    def over_time(self, history: dict[str, np.ndarray]) -> dict[str, float]:
+    def theory(self, eos, times: np.ndarray) -> dict[str, np.ndarray]:
+        """What theory says of columns of the history at `times` (M,), rising: drawn beside them."""
+        return {}
+
+    def over_time(self, eos, history: dict[str, np.ndarray]) -> dict[str, float]:
         """The same from the whole history, whose columns are (steps,), e.g. when a mode peaked."""
         return {}

@@ -1,7 +1,8 @@
 """Kelvin-Helmholtz instability of a smooth shear layer, which converges with resolution.
 
 McNally, Lyra & Passy (2012), ApJS 201, 18: section 2 for the initial state, section 4 for the
-mode's amplitude.
+mode's amplitude. Its growth is held against linear theory, for the same initial state and
+measured in the same way: that velocity is no eigenmode, and its amplitude first falls.
 """
 
 from typing import Annotated, ClassVar, Literal
@@ -9,6 +10,7 @@ from typing import Annotated, ClassVar, Literal
 import numpy as np
 from pydantic import AfterValidator, Field
 
+from sph.exact import kelvin_helmholtz as linear
 from sph.lattice import fill
 from sph.problems import base
 
@@ -20,6 +22,10 @@ RAMP = 0.025  # the length over which one becomes the other
 PRESSURE = 2.5
 WAVELENGTH = 0.5
 PERTURBATION = 0.01  # amplitude of the velocity along y
+# Times between which growth is measured: what decays is gone by then, and gas has moved less than
+# the ramp is wide.
+GROWTH = (0.5, 1.0)
+POINTS = 128  # of linear theory across the layers: its growth rate is known to 0.1 %
 
 
 def only(domain: list[float]) -> AfterValidator:
@@ -75,6 +81,37 @@ class Problem(base.Problem):
     def report(self, eos, time: float, particles, pressure) -> dict[str, float]:
         return self.diagnostics(particles)
 
+    def theory(self, eos, times: np.ndarray) -> dict[str, np.ndarray]:
+        """The mode's amplitude by linear theory."""
+        y = linear.points(1.0, POINTS)
+        density, wavenumber = _ramped(*DENSITY, y), 2.0 * np.pi / WAVELENGTH
+        stiffness = density * eos.sound_speed(density, np.full(POINTS, PRESSURE)) ** 2
+        layer = linear.ShearLayer(1.0, _ramped(*SPEED, y), density, stiffness)
+        start = np.zeros((3, POINTS), dtype=complex)
+        start[1] = -1j * PERTURBATION  # sin(kx) is the real part of -i e^(ikx)
+        upward = linear.evolution(layer, wavenumber, start, times)[:, 1]
+        weight = _surface_weight(y - 0.5, wavenumber)
+        return {"mode_amplitude": np.abs(upward @ weight) / weight.sum()}
+
+    def over_time(self, eos, history: dict[str, np.ndarray]) -> dict[str, float]:
+        """Rate at which the mode's amplitude grows from t = 0.5 to 1, by least squares.
+
+        growth_rate: measured; linear_growth_rate: what linear theory has at the same times;
+        growth_ratio: the first over the second. Nothing where the history does not span them.
+        """
+        t = history["t"]
+        inside = (t >= GROWTH[0]) & (t <= GROWTH[1])
+        if t[0] > GROWTH[0] or t[-1] < GROWTH[1] or inside.sum() < 2:
+            return {}
+        t = t[inside]
+        by_theory = _growth(t, self.theory(eos, t)["mode_amplitude"])
+        measured = _growth(t, history["mode_amplitude"][inside])
+        return {
+            "growth_rate": measured,
+            "linear_growth_rate": by_theory,
+            "growth_ratio": measured / by_theory,
+        }
+
 
 def mode_amplitude(particles, x, height, velocity, wavelength: float) -> float:
     """Amplitude of the mode of that wavelength along x in `velocity` (N,) (eqs 10-13).
@@ -83,11 +120,19 @@ def mode_amplitude(particles, x, height, velocity, wavelength: float) -> float:
     weigh by their volume and by their distance from the nearer face, as a surface mode decays.
     """
     wavenumber = 2.0 * np.pi / wavelength
-    distance = np.abs(np.abs(height) - 0.25)
-    weight = particles.mass / particles.density * np.exp(-wavenumber * distance)
+    weight = particles.mass / particles.density * _surface_weight(height, wavenumber)
     sine = (weight * velocity * np.sin(wavenumber * x)).sum()
     cosine = (weight * velocity * np.cos(wavenumber * x)).sum()
     return float(2.0 * np.hypot(sine, cosine) / weight.sum())
+
+
+def _surface_weight(height: np.ndarray, wavenumber: float) -> np.ndarray:
+    return np.exp(-wavenumber * np.abs(np.abs(height) - 0.25))
+
+
+def _growth(t: np.ndarray, amplitude: np.ndarray) -> float:
+    """Slope of the amplitude's logarithm over time, by least squares."""
+    return float(np.polyfit(t, np.log(amplitude), 1)[0])
 
 
 def _ramped(outside: float, inside: float, y: np.ndarray) -> np.ndarray:

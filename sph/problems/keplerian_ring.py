@@ -101,7 +101,7 @@ class Problem(base.Problem):
             "radial_deviation": _rms(radius[kept] - start[kept]) / self.width,
         }
 
-    def over_time(self, history: dict[str, np.ndarray]) -> dict[str, float]:
+    def over_time(self, eos, history: dict[str, np.ndarray]) -> dict[str, float]:
         """orbits_intact: orbits at its middle before the ring deviates by more than the bounds.
 
         The last time of the history where it never does.

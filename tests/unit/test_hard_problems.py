@@ -218,9 +218,11 @@ def test_ring_counts_orbits_until_it_breaks():
     problem = KeplerianRing()
     t = 2.0 * np.pi * np.linspace(0.0, 4.0, 9)
     whole = {"t": t, "density_deviation": np.full(9, 0.09), "radial_deviation": np.full(9, 0.019)}
-    assert problem.over_time(whole) == {"orbits": 4.0, "orbits_intact": 4.0}
+    assert problem.over_time(MONATOMIC, whole) == {"orbits": 4.0, "orbits_intact": 4.0}
     spread = whole | {"radial_deviation": np.linspace(0.0, 0.04, 9)}
-    assert problem.over_time(spread)["orbits_intact"] == 2.5  # 0.02 is not more than 0.02
+    assert (
+        problem.over_time(MONATOMIC, spread)["orbits_intact"] == 2.5
+    )  # 0.02 is not more than 0.02
     displaced = particles_of(problem, MONATOMIC)
     displaced.position = 1.05 * displaced.position
     found = problem.diagnostics(displaced)["radial_deviation"]

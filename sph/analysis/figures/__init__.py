@@ -87,7 +87,8 @@ def _pictures(source: Source):
     if source.run.history.exists():
         steps = read_history(source.run.history)
         if steps["t"].size:
-            yield "history", history.figure(steps, last.title)
+            theory = last.problem.theory(last.eos, steps["t"])
+            yield "history", history.figure(steps, last.title, theory)
 
 
 def _check_format(target: Path) -> None:

@@ -15,10 +15,12 @@ ENERGIES = (
 STYLES = ("-", "--", "-.")
 
 
-def figure(history: dict[str, np.ndarray], title: str) -> Figure:
+def figure(
+    history: dict[str, np.ndarray], title: str, theory: dict[str, np.ndarray] | None = None
+) -> Figure:
     """Energies, their drift, momentum, steps by what limited them, and the problem's diagnostics.
 
-    `history` is that of `sph.output.history.read`.
+    `history` is that of `sph.output.history.read`; `theory` has what is said of its columns.
     """
     momentum = [name for name in history if name.startswith("momentum_")]
     further = [name for name in history if name not in shared_columns(len(momentum))]
@@ -28,7 +30,7 @@ def figure(history: dict[str, np.ndarray], title: str) -> Figure:
     _momentum(panels[2], history, momentum)
     _steps(panels[3], history)
     for panel, name in zip(panels[4:], further, strict=True):
-        _diagnostic(panel, history, name)
+        _diagnostic(panel, history, name, (theory or {}).get(name))
     for panel in panels:
         if panel.get_subplotspec().is_last_row():
             panel.set_xlabel("$t$")
@@ -85,9 +87,12 @@ def _steps(panel, history) -> None:
     panel.legend(loc="best", markerscale=3.0, title="limited by")
 
 
-def _diagnostic(panel, history, name: str) -> None:
+def _diagnostic(panel, history, name: str, theory: np.ndarray | None) -> None:
     values = history[name]
-    panel.plot(history["t"], values, color=style.PALETTE[0])
+    panel.plot(history["t"], values, color=style.PALETTE[0], label="this run")
+    if theory is not None:
+        panel.plot(history["t"], theory, "--", color="black", label="theory")
+        panel.legend(loc="best")
     panel.set_ylabel(name.replace("_", " "))
     if np.all(values > 0.0) and np.ptp(values) > 0.0:
         panel.set_yscale("log")

@@ -344,6 +344,10 @@ def test_history_shows_drift_limiter_and_diagnostics(shear):
     assert [line[0].tolist() for line in lines(steps)] == [[0.0], [0.5]]
     assert mode.get_yscale() == "log"
     np.testing.assert_array_equal(lines(mode)[0][1], found["mode_amplitude"])
+    assert len(lines(mode)) == 1
+    beside = {"mode_amplitude": np.array([0.1, 0.2])}
+    *_, mode = history.figure(found, "a run", beside).axes
+    np.testing.assert_array_equal(lines(mode)[1][1], beside["mode_amplitude"])
 
 
 # --- style ------------------------------------------------------------------------------------
