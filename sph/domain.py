@@ -32,6 +32,10 @@ class Domain:
     def _axes(self):
         return zip(self.box, self.boundaries, strict=True)
 
+    @property
+    def largest_side(self) -> float:
+        return float((self.box[:, 1] - self.box[:, 0]).max())
+
     @cached_property
     def images(self) -> Images:
         """The identity and every image that can reach into the box from one box length away."""

@@ -36,6 +36,11 @@ def run(config: Config, directory: RunDirectory, progress) -> dict:
     with stop_signals() as stopped_by, closing(Clock()) as clock:
         progress.note("preparing: the first run of a scene compiles its code, for up to a minute")
         simulation = Simulation.start(Scene(config), threads_of(config), clock)
+        if simulation.held_supports:
+            progress.note(
+                f"{simulation.held_supports} particle(s) have too few neighbours: their supports "
+                f"are held at {simulation.scene.max_support:.4g} (physics.max_support)"
+            )
         directory.write_config(config.to_toml())
         history = new_history(config, simulation, directory)
         runner = Runner(config, directory, simulation, history, progress, stopped_by)
@@ -50,6 +55,8 @@ def new_history(config: Config, simulation: Simulation, directory: RunDirectory)
 def _of_the_scene(simulation: Simulation) -> dict[str, float]:
     """Columns of the history that only some scenes have."""
     scene, columns = simulation.scene, {}
+    if scene.max_support < math.inf:
+        columns["held_supports"] = simulation.held_supports
     if scene.external is not None:
         columns["potential_energy"] = simulation.totals.potential_energy
     if scene.heating is not None:

@@ -1,5 +1,6 @@
 """A scene: what the configuration asks for, and nothing else, in the form the passes take."""
 
+import math
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -70,6 +71,13 @@ class Scene:
         return schemes.sums_pressure(self.models.scheme)
 
     @property
+    def max_support(self) -> float:
+        """Where supports are held; inf where a closed axis ends them, which is an error."""
+        if any(boundary != "open" for boundary in self.domain.boundaries):
+            return math.inf
+        return self.config.physics.max_support * self.domain.largest_side
+
+    @property
     def bounds_acceleration(self) -> bool:
         """Whether |a| bounds the step: a field, or heavy gas beside light, sends no signal."""
         return self.external is not None or self.config.physics.density == "number"
@@ -109,6 +117,7 @@ class Scene:
             balsara=balsara.Balsara() if physics.balsara else None,
             support_ratio=kernels.support_ratio(kernel, self.dimension),
             eta=float(physics.eta),
+            max_support=self.max_support,
         )
 
     def parts(self) -> tuple[list[str], list[str]]:

@@ -41,6 +41,7 @@ class Simulation:
         self.step = 0
         self.steps_here = 0  # of this session, which a restart begins anew
         self.list_builds = 0
+        self.held_supports = 0  # particles too lonely for a support within physics.max_support
         self.limit = None
         self.totals = None
         self.energy_added = 0.0  # by heating, since the run began
@@ -219,6 +220,7 @@ class Simulation:
                 )  # fmt: skip
             if not self._wanted.max() > 0.0:
                 p.support, self._support = self._support, p.support
+                self._check_found(models)
                 return
             with self.clock.phase("lists"):
                 self._bring_inside()
@@ -231,6 +233,27 @@ class Simulation:
             "a closed domain (problem.boundary), or more particles",
             among[0],
         )
+
+    def _check_found(self, models) -> None:
+        """Count the supports that are held; raise where one has no root however small it is."""
+        p = self.particles
+        if models.max_support < np.inf:
+            self.held_supports = int(np.count_nonzero(p.support == models.max_support))
+        if p.density.min() < 0.0:
+            i = int(np.argmin(p.density))
+            here = p.position[:, i]
+            images = zip(*self.scene.domain.images, strict=True)
+            there = (s[:, None] * p.position + o[:, None] == here[:, None] for s, o in images)
+            others = sum(int(same.all(axis=0).sum()) for same in there) - 1
+            raise fault(
+                self,
+                f"there is no support small enough for particle {p.id[i]} at "
+                f"({', '.join(f'{x:.6g}' for x in here)}): {others} other(s) in the same "
+                "place, images at walls among them, outweigh what it is to hold",
+                'particles apart from each other, physics.density = "number" where one is much '
+                "heavier than its neighbour, or a larger physics.eta",
+                int(p.id[i]),
+            )
 
     def _find_shocks(self, dt: float) -> None:
         """Alpha at the end of the step dt, from gradients of velocity and acceleration."""

@@ -103,6 +103,12 @@ class Physics(Section):
     eta: float = Field(
         1.6, gt=0, description="smoothing length in units of the local particle spacing"
     )
+    max_support: float = Field(
+        1.0,
+        gt=0,
+        description="where all axes are open, the widest a kernel may get where particles are too "
+        "few to fill it, in units of the longest side of the domain",
+    )
     C: float = Field(
         0.15, gt=0, description="Courant number: the time step in units of the stable one"
     )

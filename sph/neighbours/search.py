@@ -102,9 +102,9 @@ class Search:
 
     def guess(self, position, ratio: float) -> np.ndarray:
         """Supports (N,) to begin with, none so wide that lists cannot serve it."""
-        return np.minimum(
-            first_guess(position, ratio), self.domain.longest_reach / (1 + 2 * GROWTH)
-        )
+        least = 1e-9 * self.domain.largest_side  # where all particles are in one place
+        most = min(self.domain.longest_reach / (1 + 2 * GROWTH), self.domain.largest_side)
+        return np.clip(first_guess(position, ratio), least, most)
 
     def order(self, position, identity) -> np.ndarray:
         """The block order of these particles, (N,) indices."""
@@ -135,7 +135,9 @@ class Search:
         support = self.origin.support * factor
         if self._widenings > PATIENCE:
             room = self.domain.longest_reach / (1 + self.origin.skin)
-            support = np.where(factor > 1.0, np.clip(2.0 * support, support, room), support)
+            support = np.where(
+                factor > 1.0, np.maximum(support, np.minimum(2.0 * support, room)), support
+            )
         self.build(Origin(position.copy(), support, self.origin.skin), identity)
 
 

@@ -30,6 +30,7 @@ class Models(NamedTuple):
     balsara: tuple | None
     support_ratio: float  # H/h of the kernel
     eta: float
+    max_support: float  # H is held there where it has no root within; inf: nowhere
 
 
 class Neighbours(NamedTuple):

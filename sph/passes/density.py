@@ -26,7 +26,8 @@ def density(
     whose support was not found gets a density of -1.
     """
     D = len(dim)
-    scheme, kernel, smoothing, weighting, eos, viscosity, _, balsara, support_ratio, eta = models
+    scheme, kernel, smoothing, weighting, eos, viscosity = models[:6]
+    balsara, support_ratio, eta, largest = models[7:]
     lists, images, list_support, reach_factor = neighbours
     start, count, candidates = lists
     sign, offset = images
@@ -65,7 +66,7 @@ def density(
                 r[k] = np.sqrt(squared)
             H, rho_i, Omega_i, needed = find_support(
                 smoothing, kernel, dim, r, m, nc, weight(weighting, mass[i]), support_before[i],
-                support_ratio * eta, reach_factor * list_support[i],
+                support_ratio * eta, reach_factor * list_support[i], largest,
             )  # fmt: skip
             rho_i *= mass_per_weight(weighting, mass[i])
             support[i], rho[i], Omega[i] = H, rho_i, Omega_i

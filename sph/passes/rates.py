@@ -27,7 +27,7 @@ def rates(
     particle over its pairs and itself (eq 32).
     """
     D = len(dim)
-    scheme, kernel, _, weighting, eos, viscosity, conductivity, _, _, _ = models
+    scheme, kernel, _, weighting, eos, viscosity, conductivity, _, _, _, _ = models
     lists, images, _, _ = neighbours
     start, count, candidates = lists
     sign, offset = images

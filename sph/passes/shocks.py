@@ -60,7 +60,7 @@ def shocks(
     fields and div_v (N,) are of the density pass, acceleration (D, N) of the last step.
     """
     D = len(dim)
-    _, kernel, _, weighting, _, viscosity, _, _, _, _ = models
+    _, kernel, _, weighting, _, viscosity, _, _, _, _, _ = models
     lists, images, _, _ = neighbours
     start, count, candidates = lists
     sign, offset = images

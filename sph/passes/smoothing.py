@@ -3,7 +3,8 @@
 Both ways work on one particle's distances r[:nc] and weights m[:nc] (by default masses, see
 `weighting`) of its candidates, and return (H for what follows, rho or the sum in its place, Omega,
 wanted): `wanted` is 0.0, or, where H came to exceed `reach`, the radius within which the candidates
-are complete, the radius to list them to before trying again.
+are complete, the radius to list them to before trying again. Where there is no root up to `largest`
+H is held there and, as it does not follow the density then, Omega is 1.
 """
 
 from typing import NamedTuple
@@ -25,8 +26,8 @@ MAX_ITERATIONS = 100
 
 
 @verb
-def find_support(self, kernel, dim, r, m, nc, mass, H, ratio, reach):
-    return self.find_support(kernel, dim, r, m, nc, mass, H, ratio, reach)
+def find_support(self, kernel, dim, r, m, nc, mass, H, ratio, reach, largest):
+    return self.find_support(kernel, dim, r, m, nc, mass, H, ratio, reach, largest)
 
 
 class FixedPasses(NamedTuple):
@@ -35,7 +36,7 @@ class FixedPasses(NamedTuple):
     count: int
     tolerance: float  # of the solution, relative
 
-    def find_support(self, kernel, dim, r, m, nc, mass, H, ratio, reach):
+    def find_support(self, kernel, dim, r, m, nc, mass, H, ratio, reach, largest):
         C = normalisation(kernel, dim)
         D = len(dim)
         rho = 0.0
@@ -56,9 +57,11 @@ class FixedPasses(NamedTuple):
                     sum_dw += m[k] * (q * q) * dw_over_q(kernel, dim, q)
                 Omega = -sum_dw / (D * sum_w)  # eq 8 with eqs 7 and 10: the D w terms cancel the 1
             rho = C * H_inv**D * sum_w  # eq 7
-            H = ratio * (mass / rho) ** (1.0 / D)  # eq 15
-        if abs(H * H_inv - 1.0) > UNSETTLED:
-            return solve(kernel, dim, r, m, nc, mass, 1.0 / H_inv, ratio, reach, self.tolerance)
+            H = min(ratio * (mass / rho) ** (1.0 / D), largest)  # eq 15
+        if abs(H * H_inv - 1.0) > UNSETTLED or not largest > H:
+            return solve(
+                kernel, dim, r, m, nc, mass, 1.0 / H_inv, ratio, reach, largest, self.tolerance
+            )
         return H, rho, Omega, (0.0 if reach >= H else H)
 
 
@@ -67,16 +70,17 @@ class Converged(NamedTuple):
 
     tolerance: float
 
-    def find_support(self, kernel, dim, r, m, nc, mass, H, ratio, reach):
-        return solve(kernel, dim, r, m, nc, mass, H, ratio, reach, self.tolerance)
+    def find_support(self, kernel, dim, r, m, nc, mass, H, ratio, reach, largest):
+        return solve(kernel, dim, r, m, nc, mass, H, ratio, reach, largest, self.tolerance)
 
 
 @njit(**COMPILED, forceinline=True)
-def solve(kernel, dim, r, m, nc, mass, H, ratio, reach, tolerance):
+def solve(kernel, dim, r, m, nc, mass, H, ratio, reach, largest, tolerance):
     """The root of eqs 7 and 15: Newton's iteration, safeguarded by bisection."""
     C = normalisation(kernel, dim)
     D = len(dim)
     target = mass * ratio**D / C  # sum m w at the root of eqs 7 and 15
+    H = min(H, largest)
     lower, upper = 0.0, 0.0  # bracket; upper = 0: none known yet
     for _ in range(MAX_ITERATIONS):
         if not reach >= H:
@@ -90,12 +94,15 @@ def solve(kernel, dim, r, m, nc, mass, H, ratio, reach, tolerance):
             sum_dw += m[k] * (q * q) * dw_over_q(kernel, dim, q)
         if sum_w < target:  # sum m w(r/H) rises with H
             lower = H
+            if not largest > H:
+                return H, C * H_inv**D * sum_w, 1.0, 0.0
         else:
             upper = H
         # d ln(sum m w)/d ln H = -sum_dw/sum_w; it vanishes without neighbours, where the step
         # goes to its bound, upwards a small one: a support too wide has many neighbours
         slope = max(-sum_dw / sum_w, 0.1)
-        H_next = H * min(max((target / sum_w) ** (1.0 / slope), 0.5), 1.25)
+        growth = 1.25 if slope > 0.1 else 2.0
+        H_next = min(H * min(max((target / sum_w) ** (1.0 / slope), 0.5), growth), largest)
         if upper > 0.0 and not lower < H_next < upper:
             H_next = 0.5 * (lower + upper)
         if abs(H_next - H) <= tolerance * H:

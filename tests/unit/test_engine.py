@@ -139,6 +139,7 @@ class Case:
             balsara=balsara.Balsara() if self.balsara else None,
             support_ratio=kernels.support_ratio(kernel, self.dimension),
             eta=self.eta,
+            max_support=np.inf,
         )
 
 
@@ -425,7 +426,12 @@ def simulate(case, gas, end, threads=1):
         density=case.density,
     )  # fmt: skip
     whole = config.Config(
-        problem, physics, config.Time(end=end), config.Output(interval=end), config.Run()
+        problem,
+        physics,
+        config.Time(end=end),
+        config.Output(interval=end),
+        config.Report(),
+        config.Run(),
     )
     clock = Clock()
     run = simulation.Simulation.start(Scene(whole), threads, clock)
