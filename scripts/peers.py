@@ -31,7 +31,7 @@ from sph.output import checkpoint
 from sph.output.run_directory import RunDirectory
 
 HOME = Path(__file__).resolve().parent.parent
-PATIENCE = 300  # wall seconds of one run, after which it counts as not ended
+PATIENCE = 3600  # wall seconds of one run, after which it counts as not ended
 SHORT = 0.01  # of the time to the end: the run that only compiles
 NONSENSE = 0.1  # relative change of the energy beyond which errors mean nothing
 GRID = 256  # cells per axis of the grid that judges the shear layer
@@ -43,7 +43,7 @@ class Case(NamedTuple):
     title: str
     config: str
     sizes: tuple[int, ...]  # particles asked for
-    overrides: tuple[str, ...]
+    overrides: tuple[str, ...]  # of our configuration, for all sizes alike
     example: tuple[str, str]  # module and class in pysph.examples.gas_dynamics
     schemes: dict[str, tuple[int, ...]]  # PySPH's schemes, with the particles each is run at
     step: float  # PySPH's fixed time step over the smallest spacing, of its example
@@ -59,7 +59,14 @@ CASES = {
         "Sod, 1-D",
         "sod",
         (90, 180, 360, 720, 1440),
-        ("time.end=0.15",),
+        (
+            "time.end=0.15",
+            "physics.scheme=variational",
+            "physics.kernel=cubic_spline",
+            "physics.eta=1.2",
+            "physics.alpha=0.7",
+            "physics.C=0.3",
+        ),
         ("sod_shocktube", "SodShockTube"),
         {"adke": (180, 360, 720), "mpm": (180, 360, 720), "gsph": (180, 360, 720)},
         0.128,
@@ -70,8 +77,15 @@ CASES = {
     "sedov": Case(
         "Point explosion, 2-D",
         "point_explosion_2d",
-        (1024, 2304, 4096, 9216),
-        (),
+        (576, 1024, 2304, 4096, 9216),
+        (
+            "physics.scheme=variational",
+            "physics.kernel=cubic_spline",
+            "physics.eta=1.2",
+            "physics.alpha=1.0",
+            "physics.conductivity=approach",
+            "physics.energy_limit=false",
+        ),
         ("sedov", "SedovPointExplosion"),
         {"mpm": (1024, 2304, 4096), "tsph": (1024, 2304)},
         0.0104,
@@ -82,8 +96,14 @@ CASES = {
     "noh": Case(
         "Noh, 2-D",
         "noh_2d",
-        (707, 1257, 2827, 5027),
-        (),
+        (314, 707, 1257, 2827, 5027),
+        (
+            "physics.scheme=variational",
+            "physics.eta=1.2",
+            "physics.alpha=0.7",
+            "physics.conductivity=approach",
+            "physics.C=0.2",
+        ),
         ("noh", "NohImplosion"),
         {"crksph": (707, 1257, 2827), "mpm": (707, 1257, 2827), "gsph": (1257,)},
         0.05,
