@@ -141,6 +141,7 @@ def _with_threads(overrides, threads):
 main.add_command(cli_studies.sweep)
 main.add_command(cli_studies.report)
 main.add_command(cli_studies.stress)
+main.add_command(cli_studies.stability)
 
 if __name__ == "__main__":
     main()

@@ -1,4 +1,4 @@
-"""The commands over many runs: `sph sweep`, `sph report` and `sph stress`."""
+"""The commands over many runs: `sph sweep`, `sph report`, `sph stress` and `sph stability`."""
 
 from pathlib import Path
 
@@ -89,3 +89,33 @@ def stress(only, directory, jobs):
     if not table.is_passed(results):
         raise NumericalError(table.closing(results))
     click.echo(table.closing(results))
+
+
+@click.command()
+@click.argument("config", type=click.Path(path_type=Path))
+@click.option("--key", default="physics.C", show_default=True, metavar="physics.C|physics.eta",
+              help="The key whose stable range is looked for.")  # fmt: skip
+@click.option("--set", "overrides", multiple=True, metavar="KEY=VALUE",
+              help="Set a key of the configuration; may be repeated.")  # fmt: skip
+@click.option("--limit", "limits", multiple=True, metavar="KEY=VALUE",
+              help="What a stable run keeps and how it is looked for: reference, error_growth, "
+              "deviation, round_off, resolution; may be repeated.")  # fmt: skip
+@click.option("-o", "directory", type=click.Path(path_type=Path), metavar="DIR",
+              help="Where the runs go; runs/<name of CONFIG>-stability if not given.")  # fmt: skip
+@click.option("--jobs", type=click.IntRange(min=1), metavar="N",
+              help="Runs at once; as many as there are processors if not given.")  # fmt: skip
+def stability(config, key, overrides, limits, directory, jobs):
+    """Find by bisection how far C or eta of CONFIG is from where runs stop being stable.
+
+    Run again, it does only what is missing. Exits with 3 if nothing that was tried is stable.
+    """
+    from sph.stability import command, picture, table
+
+    target = directory or Path("runs") / f"{config.stem}-stability"
+    found = command.run(config, key, overrides, target, limits, jobs)
+    words = table.in_words(found)
+    for path in (*table.write(found, target), picture.draw(found, target / f"{key}.png")):
+        click.echo(f"wrote {path}")
+    if all(edge.inside is None for edge in found.edges.values()):
+        raise NumericalError(words)
+    click.echo(words)

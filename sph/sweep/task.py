@@ -33,6 +33,7 @@ class Outcome(NamedTuple):
     status: str  # "done", "failed" or "stopped": it has not ended, and goes on in the next sweep
     reason: str = ""
     how: str = ""  # "run" or "restart" in this attempt; empty where nothing was done
+    code: int = 0  # exit code of this attempt
 
 
 @dataclass(frozen=True)
@@ -99,7 +100,7 @@ def execute(task: Task, stops: Callable[[], int] = lambda: 0) -> Outcome:
     except Stopped as stopped:
         return Outcome(task.point.name, "stopped", str(stopped))
     except SphError as error:
-        return Outcome(task.point.name, "failed", str(error))
+        return Outcome(task.point.name, "failed", str(error), code=error.exit_code)
 
 
 def standing(task: Task) -> Outcome:
@@ -131,7 +132,7 @@ def _attempt(task: Task, log: BinaryIO, stops: Callable[[], int]) -> Outcome:
         return Outcome(name, "stopped", reason, how)
     reason = _reason(task, code, begin)
     write_text(task.failure, reason + "\n")
-    return Outcome(name, "failed", reason, how)
+    return Outcome(name, "failed", reason, how, code)
 
 
 def _wait(child: subprocess.Popen, stops: Callable[[], int]) -> int:

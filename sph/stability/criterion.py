@@ -1,0 +1,214 @@
+"""When a run is stable: by its status, its errors and its energy, beside a run of small steps."""
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from sph.analysis.errors import FIELDS, norms
+from sph.config.errors import suggestion
+from sph.errors import ConfigError, NumericalError
+from sph.output import checkpoint as checkpoints
+from sph.output.checkpoint import Checkpoint
+from sph.output.run_directory import RunDirectory
+
+NONE = float("nan")
+
+
+class Criterion(NamedTuple):
+    """What a run must keep to be called stable; every default stands here alone."""
+
+    # C of the reference run, as a part of the configuration's: errors of the step fall as C^2, so
+    # that what a quarter leaves of them is small beside what error_growth allows.
+    reference: float = 0.25
+    # L1 error of any field, and energy drift, over the reference's: a half more is well above what
+    # the order of sums does, and well below what a run does that blows up.
+    error_growth: float = 1.5
+    # Without an exact solution: L1 of the difference from the reference, particle by particle, as
+    # a part of the field's mean size (of |v| + c_s for velocity).
+    deviation: float = 0.05
+    # Errors below this part of the field's mean size are round-off, whatever the reference's are.
+    round_off: float = 1e-9
+    # Factor between the last stable and the first unstable value at which bisection ends.
+    resolution: float = 1.1
+
+    @classmethod
+    def of(cls, texts) -> "Criterion":
+        """The defaults with `KEY=VALUE` set on top. Raises ConfigError."""
+        values = {}
+        for text in texts:
+            key, _, value = text.partition("=")
+            if key not in cls._fields:
+                raise ConfigError(f"--limit {text}: unknown; {suggestion(key, cls._fields)}")
+            values[key] = _positive(text, value, above=1.0 if key in ABOVE_ONE else 0.0)
+        if values.get("reference", 0.0) > 1.0:
+            raise ConfigError("--limit reference: expected at most 1, of the configuration's C")
+        return cls(**values)
+
+
+ABOVE_ONE = ("error_growth", "resolution")
+
+
+@dataclass(frozen=True)
+class Trial:
+    """A run at a value of the key, and what came of it."""
+
+    value: float
+    name: str  # its directory
+    verdict: str  # "stable", "beyond" a limit, or "failed": the run stopped itself
+    reason: str  # in words; empty where it is stable
+    error: float  # the field nearest to its limit or farthest beyond, over that limit
+    field: str  # which that is
+    drift: float  # largest |E - E_0|/|E_0| at any step
+    steps: int
+    cpu: float  # seconds without compiling
+
+    @property
+    def is_stable(self) -> bool:
+        return self.verdict == "stable"
+
+
+class Judge:
+    """Judges runs beside a reference run of the same particles."""
+
+    def __init__(self, reference: Path, criterion: Criterion):
+        """Raises NumericalError where the reference itself came to no end, FileError."""
+        self.directory = reference
+        self.summary = read_summary(reference)
+        if self.summary["status"] != "done":
+            raise NumericalError(
+                f"the reference run {reference.name} fails: {self.summary['reason']}\nTry: "
+                "--limit reference with a smaller part of C, or other settings with --set."
+            )
+        self.state = _last(reference)
+        self.criterion = criterion
+        self.drift = self._largest_drift()
+        self.errors = self._largest_errors()
+
+    @property
+    def has_exact(self) -> bool:
+        return self.summary["errors"] is not None
+
+    def trial(self, value: float, directory: Path) -> Trial:
+        """The trial whose run, ended, is in `directory`. Raises FileError."""
+        summary = read_summary(directory)
+        drift = summary["conservation"]["energy_drift_max"]
+        numbers = (drift, summary["steps"], _cpu(summary))
+        if summary["status"] == "failed":
+            reason = first_line(summary["reason"])
+            return Trial(value, directory.name, "failed", reason, NONE, "", *numbers)
+        errors = self._errors(summary, directory)
+        field = max(errors, key=lambda name: _closeness(errors[name] / self.errors[name]))
+        error = errors[field] / self.errors[field]
+        broken = []
+        if not error <= 1.0:
+            broken.append(f"the error of {field.replace('_', ' ')} is {error:.3g} of its limit")
+        if not drift <= self.drift:
+            broken.append(f"energy drifts by {drift:.2g}, more than {self.drift:.2g}")
+        verdict = "beyond" if broken else "stable"
+        return Trial(
+            value, directory.name, verdict, " and ".join(broken), error, field, *numbers
+        )  # fmt: skip
+
+    def in_words(self) -> str:
+        """What runs are held to."""
+        if self.has_exact:
+            errors = (
+                f"L1 errors of all fields at most {self.criterion.error_growth:g} times those at "
+                f"C = {self._courant:g}"
+            )
+        else:
+            errors = (
+                f"fields within {self.criterion.deviation:.0%} of the run at C = {self._courant:g}"
+            )
+        return f"it ends, {errors}, energy drift at most {self.drift:.2g}"
+
+    @property
+    def _courant(self) -> float:
+        return self.state.config.physics.C
+
+    def _largest_drift(self) -> float:
+        """The problem's limit, or error_growth times what the reference does where that is more."""
+        limit = self.state.config.problem.limits.get("energy_drift")
+        bound = self.state.config.physics.max_energy_drift if limit is None else limit.bound
+        own = self.summary["conservation"]["energy_drift_max"]
+        return max(bound, self.criterion.error_growth * own)
+
+    def _largest_errors(self) -> dict[str, float]:
+        """The largest L1 error that a stable run has, by field."""
+        sizes = _sizes(self.state)
+        if not self.has_exact:
+            return {name: self.criterion.deviation * size for name, size in sizes.items()}
+        growth, round_off = self.criterion.error_growth, self.criterion.round_off
+        fields = self.summary["errors"]["fields"]
+        return {
+            name: max(growth * norm["L1"], round_off * sizes[name]) for name, norm in fields.items()
+        }
+
+    def _errors(self, summary: dict, directory: Path) -> dict[str, float]:
+        """L1 errors by field: against the exact solution, or else against the reference."""
+        if self.has_exact:
+            fields = (summary["errors"] or {}).get("fields", {})
+            return {name: fields.get(name, {}).get("L1", NONE) for name in self.errors}
+        state = _last(directory)
+        volume = _by_id(self.state, self.state.particles.mass / self.state.particles.density)
+        return {
+            name: norms(
+                _by_id(state, _field(state, name)) - _by_id(self.state, _field(self.state, name)),
+                volume,
+            )["L1"]
+            for name in self.errors
+        }
+
+
+def read_summary(directory: Path) -> dict:
+    """The summary of a run that has ended."""
+    return json.loads(RunDirectory(directory).summary.read_text(encoding="utf-8"))
+
+
+def first_line(text: str) -> str:
+    return text.partition("\n")[0].rstrip(".")
+
+
+def _last(directory: Path) -> Checkpoint:
+    return checkpoints.read(RunDirectory(directory).checkpoints()[-1])
+
+
+def _sizes(state: Checkpoint) -> dict[str, float]:
+    """Mean size of each field over the volume; of |v| + c_s for velocity, which may be zero."""
+    p = state.particles
+    volume = p.mass / p.density
+    sound = state.config.physics.eos_model().sound_speed(p.density, state.pressure)
+    sizes = {name: _field(state, name) for name in FIELDS}
+    sizes["velocity"] = np.linalg.norm(p.velocity, axis=0) + sound
+    return {name: norms(size, volume)["L1"] for name, size in sizes.items()}
+
+
+def _field(state: Checkpoint, name: str) -> np.ndarray:
+    """(N,) or (D, N)."""
+    return state.pressure if name == "pressure" else getattr(state.particles, name)
+
+
+def _by_id(state: Checkpoint, values: np.ndarray) -> np.ndarray:
+    return values[..., np.argsort(state.particles.id)]
+
+
+def _closeness(value: float) -> float:
+    """`value` to compare by, with what is no number farthest."""
+    return value if value == value else float("inf")
+
+
+def _cpu(summary: dict) -> float:
+    return summary["cost"]["cpu_seconds"] - summary["cost"]["session"]["compile_cpu_seconds"]
+
+
+def _positive(text: str, value: str, above: float) -> float:
+    try:
+        number = float(value)
+    except ValueError:
+        number = NONE
+    if not (above < number < float("inf")):
+        raise ConfigError(f"--limit {text}: expected a number above {above:g}")
+    return number

@@ -1,0 +1,122 @@
+"""What came of a search: words for the terminal, JSON and CSV."""
+
+import csv
+import io
+import json
+import math
+from dataclasses import asdict
+from pathlib import Path
+
+from sph.output.files import explained, write_text
+from sph.stability.command import Found
+
+COLUMNS = ("value", "verdict", "error_over_limit", "field", "energy_drift", "steps", "cpu_seconds",
+           "name", "reason")  # fmt: skip
+
+
+def in_words(found: Found) -> str:
+    """Where the ends are, how far the configuration is from them, and what happens there."""
+    lines = [
+        f"{found.config}, {found.scheme}, {found.particles} particles to t = {found.end:g}; "
+        f"stable: {found.judge.in_words()}."
+    ]
+    for end in found.edges:
+        lines.append(_of_an_end(found, end))
+        if islands := found.islands(end):
+            lines.append(
+                f"  It is not one range: stable again at {', '.join(f'{x:g}' for x in islands)}."
+            )
+    return "\n".join(lines)
+
+
+def margin(found: Found, end: str) -> float:
+    """The last stable value over the configuration's, NaN where there is none."""
+    inside = found.edges[end].inside
+    return math.nan if inside is None else inside / found.default
+
+
+def as_json(found: Found) -> str:
+    """Everything. NaN is null."""
+    content = {
+        "config": found.config,
+        "problem": found.problem,
+        "scheme": found.scheme,
+        "particles": found.particles,
+        "end": found.end,
+        "key": found.key,
+        "default": found.default,
+        "criterion": found.judge.criterion._asdict(),
+        "stable": found.judge.in_words(),
+        "reference": {
+            "name": found.judge.directory.name,
+            "largest_errors": found.judge.errors,
+            "largest_drift": found.judge.drift,
+            "against_exact": found.judge.has_exact,
+        },
+        "ends": {
+            end: {
+                "stable": edge.inside,
+                "unstable": edge.outside,
+                "over_default": _plain(margin(found, end)),
+                "reason": "" if edge.outside is None else found.at(edge.outside).reason,
+                "verdict": "" if edge.outside is None else found.at(edge.outside).verdict,
+                "stable_again_at": found.islands(end),
+            }
+            for end, edge in found.edges.items()
+        },
+        "words": in_words(found),
+        "trials": [
+            {name: _plain(value) for name, value in asdict(trial).items()} for trial in found.trials
+        ],
+    }
+    return json.dumps(content, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+
+
+def as_csv(found: Found) -> str:
+    """A line for each trial, by value."""
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(COLUMNS)
+    for one in found.trials:
+        writer.writerow(
+            (one.value, one.verdict, one.error, one.field, one.drift, one.steps, one.cpu, one.name,
+             one.reason)
+        )  # fmt: skip
+    return text.getvalue()
+
+
+def write(found: Found, directory: Path) -> list[Path]:
+    """Write both, named after the key; returns the files. Raises FileError."""
+    texts = {"json": as_json(found), "csv": as_csv(found)}
+    with explained(f"cannot write to {directory}"):
+        for ending, text in texts.items():
+            write_text(directory / f"{found.key}.{ending}", text)
+    return [directory / f"{found.key}.{ending}" for ending in texts]
+
+
+def _of_an_end(found: Found, end: str) -> str:
+    edge, key = found.edges[end], found.key
+    side = "up" if end == "largest" else "down"
+    if edge.inside is None:
+        reason = found.at(found.default).reason
+        return f"{key}: nothing that was tried is stable; at {found.default:g} {reason}."
+    if edge.outside is None:
+        return (
+            f"{key}: stable {side} to {edge.inside:g}, {_ratio(found, end)}, as far as was tried."
+        )
+    trial = found.at(edge.outside)
+    return (
+        f"{key}: stable {side} to {edge.inside:g}, {_ratio(found, end)}; at {edge.outside:g} "
+        f"{'the run fails: ' if trial.verdict == 'failed' else ''}{trial.reason}."
+    )
+
+
+def _ratio(found: Found, end: str) -> str:
+    ratio = margin(found, end)
+    is_inside = ratio >= 1.0 if end == "largest" else ratio <= 1.0
+    said = f"{ratio:.2g} times the configuration's {found.default:g}"
+    return said if is_inside else f"{said}, WHICH IS BEYOND"
+
+
+def _plain(value):
+    return None if isinstance(value, float) and not math.isfinite(value) else value

@@ -1,0 +1,94 @@
+"""Runs of one configuration at values of one key, in a directory that is a sweep's.
+
+Each is a run directory like any other, named after its value. One that has ended, well or not, is
+never run again; one that was killed goes on from its last checkpoint.
+"""
+
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+from sph import config as configuration
+from sph.errors import FileError, NumericalError, Stopped
+from sph.stability.criterion import NONE, Criterion, Judge, Trial, first_line
+from sph.sweep import local
+from sph.sweep.manifest import SweepDirectory
+from sph.sweep.plan import Plan, Point
+from sph.sweep.task import Outcome, Task, tasks
+
+COURANT = "physics.C"
+DEFAULT = "default"  # name of the run of the configuration as it is
+
+
+class Trials:
+    """Runs and judges trials of `key`; `done` holds those that were asked for, by value."""
+
+    def __init__(
+        self, config: Path, key: str, overrides: Sequence[str], directory: Path,
+        criterion: Criterion, jobs: int,
+    ):  # fmt: skip
+        """Runs the reference. Raises as `run`, and as `Judge`."""
+        self.path, self.key, self.overrides, self.jobs = config, key, tuple(overrides), jobs
+        self.config = configuration.load(config, overrides)
+        self.sweep = SweepDirectory(directory.absolute())
+        self.done: dict[float, Trial] = {}
+        courant = float(f"{self.config.physics.C * criterion.reference:.6g}")
+        (task,) = self._run([self._point(COURANT, courant)])
+        if task.status is None:
+            raise NumericalError(f"the reference run fails: {self._refused[task.point.name]}")
+        self.judge = Judge(task.run.path, criterion)
+        if key == COURANT:
+            self.done[courant] = self.judge.trial(courant, task.run.path)
+
+    @property
+    def default(self) -> float:
+        """The configuration's own value of the key."""
+        return getattr(self.config.physics, self.key.partition(".")[2])
+
+    def are_stable(self, values: Sequence[float]) -> list[bool]:
+        """Whether runs at these values are, which are made where they are missing.
+
+        Raises ConfigError where the directory is of another configuration, FileError, and Stopped
+        where a run was stopped.
+        """
+        missing = [value for value in values if value not in self.done]
+        found = self._run([self._point(self.key, value) for value in missing])
+        for value, task in zip(missing, found, strict=True):
+            self.done[value] = self._trial(value, task)
+            self._say(self.done[value])
+        return [self.done[value].is_stable for value in values]
+
+    def _point(self, key: str, value: float) -> Point:
+        own = getattr(self.config.physics, key.partition(".")[2])
+        if value == own:
+            return Point(DEFAULT, ())
+        return Point(f"{key}={value!r}", (f"{key}={value!r}",))
+
+    def _run(self, points: Sequence[Point]) -> list[Task]:
+        if not points:
+            return []
+        plan = Plan(self.overrides, {}, tuple(points))
+        self.sweep.prepare(self.path, plan)
+        found = tasks(self.sweep, plan)
+        missing = [task for task in found if task.status not in ("done", "failed")]
+        outcomes: list[Outcome] = []
+        local.run(missing, self.jobs, outcomes.append)
+        self._refused = {}
+        for outcome in outcomes:
+            if outcome.status == "stopped":
+                raise Stopped(f"{outcome.name}: {outcome.reason}; the same command goes on.")
+            if outcome.status == "failed" and outcome.code != NumericalError.exit_code:
+                raise FileError(f"{outcome.name} in {self.sweep.path}: {outcome.reason}")
+            self._refused[outcome.name] = outcome.reason
+        return found
+
+    def _trial(self, value: float, task: Task) -> Trial:
+        if task.status is None:  # it said what is wrong before it made its first step
+            name = task.point.name
+            reason = first_line(self._refused[name])
+            return Trial(value, name, "failed", reason, NONE, "", NONE, 0, 0.0)
+        return self.judge.trial(value, task.run.path)
+
+    def _say(self, trial: Trial) -> None:
+        reason = f": {trial.reason}" if trial.reason else ""
+        print(f"{self.key} = {trial.value:g}: {trial.verdict}{reason}", file=sys.stderr, flush=True)

@@ -1,0 +1,183 @@
+"""A tiny search on real runs, verdicts, and what the command says and exits with."""
+
+import csv
+import json
+
+import pytest
+from click.testing import CliRunner
+
+from sph.cli import main
+from sph.errors import ConfigError
+from sph.stability import command, table
+from sph.stability.criterion import Criterion, Judge
+from sph.stability.search import Edge
+from sph.stability.trials import Trials
+
+# Sod's tube, with so few particles that a run takes no longer than its process takes to start.
+TUBE = """\
+[problem]
+name = "shock_tube"
+n = 40
+[physics]
+max_energy_drift = 0.002
+[time]
+end = 0.06
+[output]
+interval = 0.06
+"""
+
+
+@pytest.fixture(scope="module")
+def tube(tmp_path_factory):
+    path = tmp_path_factory.mktemp("stability") / "tube.toml"
+    path.write_text(TUBE)
+    return path
+
+
+def called(config, target, *arguments):
+    return CliRunner().invoke(
+        main, ["stability", str(config), "-o", str(target), "--limit", "resolution=1.5", *arguments]
+    )
+
+
+@pytest.fixture(scope="module")
+def searched(tube):
+    """The first search, and its directory."""
+    target = tube.parent / "found"
+    return called(tube, target, "--jobs", "2"), target
+
+
+def test_a_search_finds_the_largest_stable_courant_number(searched):
+    result, target = searched
+    assert result.exit_code == 0, result.output
+    found = json.loads((target / "physics.C.json").read_text())
+    end = found["ends"]["largest"]
+    assert found["default"] == 0.15
+    assert end["stable"] < end["unstable"] <= 1.5 * 1.001 * end["stable"]  # of four digits
+    assert end["over_default"] == pytest.approx(end["stable"] / 0.15)
+    verdicts = {trial["value"]: trial["verdict"] for trial in found["trials"]}
+    assert verdicts[end["stable"]] == "stable"
+    assert verdicts[end["unstable"]] in ("beyond", "failed")
+    assert max(verdicts) <= 64 * 0.15
+    assert f"physics.C: stable up to {end['stable']:g}" in result.output
+    assert (target / "physics.C.png").stat().st_size > 10_000
+    with (target / "physics.C.csv").open() as file:
+        lines = list(csv.DictReader(file))
+    assert [float(line["value"]) for line in lines] == sorted(verdicts)
+
+
+def test_a_run_that_stops_itself_is_a_verdict_with_its_reason(searched):
+    _, target = searched
+    trials = json.loads((target / "physics.C.json").read_text())["trials"]
+    failed = [trial for trial in trials if trial["verdict"] == "failed"]
+    assert failed, "the drift that is allowed is too large for this test"
+    for trial in failed:
+        assert "total energy has changed" in trial["reason"]
+        assert trial["error"] is None
+        assert (target / trial["name"] / "offenders.h5").is_file()
+
+
+def test_runs_that_are_there_are_not_repeated_and_judged_anew(searched, tube):
+    _, target = searched
+    before = {path: path.stat().st_mtime_ns for path in target.glob("*/summary.json")}
+    words = (target / "physics.C.json").read_text()
+    again = called(tube, target, "--jobs", "2")
+    assert again.exit_code == 0
+    assert (target / "physics.C.json").read_text() == words
+    assert {path: path.stat().st_mtime_ns for path in target.glob("*/summary.json")} == before
+    judge = Judge(target / "physics.C=0.0375", Criterion(error_growth=1.0000001))
+    assert judge.trial(0.15, target / "default").verdict == "beyond"
+    # the reference keeps what it is the measure of
+    assert judge.trial(0.0375, target / "physics.C=0.0375").verdict == "stable"
+
+
+def test_a_killed_run_goes_on(searched, tube):
+    _, target = searched
+    run = target / "default"
+    summary = run / "summary.json"
+    before = json.loads(summary.read_text())
+    summary.unlink()
+    (run / "checkpoints" / "checkpoint_000001.h5").unlink()
+    assert called(tube, target, "--jobs", "2").exit_code == 0
+    assert "$ sph restart" in (target / "logs" / "default.log").read_text()
+    assert json.loads(summary.read_text())["errors"] == before["errors"]
+
+
+def test_another_configuration_in_the_directory_is_refused(searched, tube):
+    _, target = searched
+    result = called(tube, target, "--set", "problem.n=50")
+    assert result.exit_code == 2
+    assert "of another configuration" in result.stderr
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["--key", "physics.alpha"], "expected one of physics.C, physics.eta"),
+        (["--limit", "growth=2"], "did you mean error_growth?"),
+        (["--limit", "deviation=-1"], "expected a number above 0"),
+        (["--limit", "error_growth=1"], "expected a number above 1"),
+        (["--limit", "reference=2"], "expected at most 1"),
+        (["--set", "problem.m=3"], "problem.m"),
+    ],
+)
+def test_a_wrong_command_exits_with_2(tube, tmp_path, arguments, said):
+    result = called(tube, tmp_path / "out", *arguments)
+    assert result.exit_code == 2, result.output
+    assert said in result.stderr
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_missing_configuration_exits_with_4(tmp_path):
+    assert called(tmp_path / "none.toml", tmp_path / "out").exit_code == 4
+
+
+def test_a_reference_that_fails_exits_with_3(tube, tmp_path):
+    result = called(tube, tmp_path / "out", "--set", "physics.max_energy_drift=1e-15")
+    assert result.exit_code == 3, result.output
+    assert "the reference run physics.C=0.0375 fails: step" in result.stderr
+
+
+def test_a_run_that_is_refused_is_a_verdict_with_its_reason(searched, tube):
+    """At eta = 40 a support is 80 spacings wide, twice the box."""
+    _, target = searched
+    trials = Trials(tube, "physics.eta", (), target, Criterion(), 1)
+    assert trials.are_stable([40.0]) == [False]
+    assert trials.done[40.0].verdict == "failed"
+    assert "wider than" in trials.done[40.0].reason
+
+
+def test_without_an_exact_solution_runs_are_held_to_the_reference(tmp_path):
+    path = tmp_path / "four.toml"
+    path.write_text(
+        '[problem]\nname = "particles"\n[time]\nend = 0.05\n[output]\ninterval = 0.05\n'
+    )
+    trials = Trials(path, "physics.C", (), tmp_path / "out", Criterion(), 1)
+    assert not trials.judge.has_exact
+    reference = trials.judge.directory
+    same = trials.judge.trial(0.0375, reference)
+    assert same.verdict == "stable"
+    assert same.error == 0.0
+    assert trials.are_stable([0.15]) == [True]
+    assert 0.0 < trials.done[0.15].error < 1.0
+    strict = Judge(reference, Criterion(deviation=1e-12))
+    assert strict.trial(0.15, tmp_path / "out" / "default").verdict == "beyond"
+    assert "fields within 5% of the run at C = 0.0375" in trials.judge.in_words()
+
+
+def test_islands_of_stability_are_told(searched, tube):
+    _, target = searched
+    found = command.run(tube, "physics.C", (), target, ("resolution=1.5",), 2)
+    reference, default, *more = (trial.value for trial in found.trials if trial.is_stable)
+    assert more
+    assert found.islands("largest") == []
+    found.edges["largest"] = Edge(reference, default)  # as if the default were beyond
+    assert found.islands("largest") == more
+    assert f"It is not one range: stable again at {more[0]:g}" in table.in_words(found)
+    assert "WHICH IS BEYOND" in table.in_words(found)
+
+
+def test_criterion_takes_what_is_set():
+    assert Criterion.of(["deviation=0.1"]).deviation == 0.1
+    with pytest.raises(ConfigError, match="expected a number above 1"):
+        Criterion.of(["resolution=many"])
