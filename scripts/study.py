@@ -75,7 +75,7 @@ STUDIES = {
     ),
     "point_explosion": Study(
         "configs/point_explosion.toml",
-        "4096,13824,32768",
+        "4096,13824",
         ("--field", "density"),
         {
             "scheme": SCHEME,
@@ -122,17 +122,17 @@ STUDIES = {
             "kernel": KERNEL,
             "eta": ETA,
             "alpha_without_balsara": (f"physics.alpha=0.5,1.0,{SWITCHES}", "physics.balsara=false"),
-            "C": ("physics.C=0.15,0.3,0.5",),
+            "C": ("physics.C=0.1,0.15,0.3,0.4",),
             "density_passes": PASSES,
         },
     ),
     "sound_wave_2d": Study(
         "configs/sound_wave.toml",
-        "256,1024,4096",
+        "256,1024,2304",
         ("--field", "report.error_velocity_relative"),
         {
-            "eta_of_Wendland_C2": ("physics.eta=1.2,1.6,2.4,3.2",),
-            "eta_of_Wendland_C4": ("physics.kernel=wendland_c4", "physics.eta=1.6,2.4,3.2,4.0"),
+            "eta_of_Wendland_C2": ("physics.eta=1.2,1.6,2.4",),
+            "eta_of_Wendland_C4": ("physics.kernel=wendland_c4", "physics.eta=2.4,3.2"),
         },
         ("problem.dimension=2",),
     ),
