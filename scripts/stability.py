@@ -1,0 +1,204 @@
+"""How far the defaults are from the limit: `sph stability` for every scheme and problem.
+
+    python scripts/stability.py [-o DIR] [--only sod --only noh …]     the searches, half an hour
+    python scripts/stability.py [-o DIR] --table                       what is there, as Markdown
+    python scripts/stability.py [-o DIR] --pictures docs/images        how each scheme fails
+
+Stopped and called again, it goes on where it was: runs that are there are not repeated. Problems
+are small and short, so that a search takes seconds.
+"""
+
+import argparse
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+ROOT = Path(__file__).parents[1]
+SCHEMES = ("grad_h", "variational", "pressure_energy")
+KEYS = ("physics.C", "physics.eta")
+
+# Shipped configurations, and what makes them small.
+PROBLEMS = {
+    "sod": {"problem.n": 200},
+    "strong_shock": {"problem.n": 300},
+    "noh": {},
+    "blast_waves": {},
+    "shu_osher": {"problem.n": 400},
+    "sound_wave": {"problem.n": 64},
+    "stiffened_tube": {"problem.n": 300},
+    "uniform": {"problem.n": 256},
+    "point_explosion_2d": {"problem.n": 1024},
+    "gresho": {"problem.n": 576, "time.end": 0.2},
+    "square": {"problem.n": 448, "time.end": 0.5},
+    "kelvin_helmholtz_smooth": {"problem.n": 576, "time.end": 0.3},
+    "kelvin_helmholtz": {"problem.n": 1530, "time.end": 0.2},
+    "yee": {"problem.n": 1024, "time.end": 1.0},
+    "point_explosion": {"problem.n": 1728},
+    "expanding_ball": {"problem.n": 500, "time.end": 0.5},
+    "contrast": {},
+    "blob": {"problem.n": 1000, "time.end": 0.5},
+    "keplerian_ring": {"problem.n": 500, "time.end": 3.0},
+}
+IDEAL_GAS_ONLY = {"pressure_energy": ("stiffened_tube",)}
+
+# Sod's tube at a C that is stable, the first that is not, and more; see `pictures`.
+SHOWN = 3
+
+
+def combinations(only):
+    """(problem, scheme) in the order of the table."""
+    for problem in PROBLEMS:
+        for scheme in SCHEMES:
+            if problem not in IDEAL_GAS_ONLY.get(scheme, ()) and (not only or problem in only):
+                yield problem, scheme
+
+
+def search(directory: Path, only) -> None:
+    """Make what is missing; what a search that exits with 3 said is kept for the table."""
+    for key in KEYS:
+        for problem, scheme in combinations(only):
+            target = directory / f"{problem}-{scheme}"
+            words = target / f"{key}.said"
+            if words.exists():
+                continue
+            sets = {"physics.scheme": scheme, "run.threads": 1, **PROBLEMS[problem]}
+            command = [
+                sys.executable, "-m", "sph.cli", "stability",
+                str(ROOT / "configs" / f"{problem}.toml"), "--key", key, "--jobs", "1",
+                "-o", str(target),
+                *(part for name in sets for part in ("--set", f"{name}={sets[name]}")),
+            ]  # fmt: skip
+            done = subprocess.run(command, capture_output=True, text=True, check=False)
+            said = (done.stdout + done.stderr).strip()
+            print(f"{problem} {scheme} {key}: exit {done.returncode}\n{done.stdout}", flush=True)
+            if done.returncode in (0, 3):
+                target.mkdir(parents=True, exist_ok=True)
+                words.write_text(said)
+            else:
+                print(said, flush=True)
+
+
+def table(directory: Path, only) -> str:
+    """A line for each problem and scheme that has been searched."""
+    lines = [
+        "| problem | N, to t | scheme | C: stable up to | over its C | then | η: stable from | "
+        "to | its η | below, above |",
+        "| :--- | :--- | :--- | ---: | ---: | :--- | ---: | ---: | ---: | :--- |",
+    ]
+    for problem, scheme in combinations(only):
+        target = directory / f"{problem}-{scheme}"
+        courant, eta = (_read(target, key) for key in KEYS)
+        if courant or eta:
+            some = courant or eta
+            lines.append(
+                f"| {problem} | {some.get('particles', '')}, {some.get('end', '')} | {scheme} | "
+                f"{' | '.join((*_courant(courant), *_eta(eta)))} |"
+            )
+    return "\n".join(lines)
+
+
+def _read(target: Path, key: str) -> dict:
+    path, said = target / f"{key}.json", target / f"{key}.said"
+    if path.exists():
+        return json.loads(path.read_text())
+    return {"failed": said.read_text()} if said.exists() else {}
+
+
+def _courant(found: dict) -> tuple[str, str, str]:
+    if "ends" not in found:
+        return ("reference fails" if found else "–", "", "")
+    end = found["ends"]["largest"]
+    return _value(end, ">"), _ratio(end), _why(found, end)
+
+
+def _eta(found: dict) -> tuple[str, str, str, str]:
+    if "ends" not in found:
+        return ("reference fails" if found else "–", "", "", "")
+    low, high = found["ends"]["smallest"], found["ends"]["largest"]
+    why = f"{_why(found, low) or '–'}; {_why(found, high) or '–'}"
+    return _value(low, "<"), _value(high, ">"), f"{found['default']:g}", why
+
+
+def _value(end: dict, sign: str) -> str:
+    if end["stable"] is None:
+        return "none"
+    return f"{'' if end['unstable'] else sign + ' '}{end['stable']:.3g}"
+
+
+def _ratio(end: dict) -> str:
+    return "" if end["over_default"] is None else f"{end['over_default']:.2g}"
+
+
+def _why(found: dict, end: dict) -> str:
+    """What ends it, in a word or two."""
+    if end["unstable"] is None:
+        return ""
+    if end["verdict"] == "failed":
+        return "stops: " + next(
+            (word for word in ("energy", "wider", "support", "step") if word in end["reason"]),
+            "numbers",
+        )
+    field = next(one["field"] for one in found["trials"] if one["value"] == end["unstable"])
+    parts = [f"error of {field.replace('_', ' ')}"] * ("the error of" in end["reason"])
+    return ", ".join([*parts, *["energy"] * ("energy drifts" in end["reason"])])
+
+
+def pictures(directory: Path, target: Path) -> None:
+    """Density of Sod's tube in each scheme: the last stable C, and runs beyond that still ended."""
+    import numpy as np
+
+    from sph.analysis.figures import style
+    from sph.output import checkpoint
+    from sph.output.run_directory import RunDirectory
+
+    with style.paper():
+        picture = style.new_figure(9.0, 7.0)
+        panels = picture.subplots(len(SCHEMES), SHOWN, sharex=True, sharey=True)
+        for row, scheme in zip(panels, SCHEMES, strict=True):
+            home = directory / f"sod-{scheme}"
+            found = _read(home, "physics.C")
+            inside = found["ends"]["largest"]["stable"]
+            shown = [
+                trial
+                for trial in found["trials"]
+                if trial["value"] >= inside and trial["verdict"] != "failed"
+            ]
+            shown = [*shown[:2], shown[-1]] if len(shown) >= SHOWN else shown
+            for panel, trial in zip(row, shown, strict=False):
+                state = checkpoint.read(RunDirectory(home / trial["name"]).checkpoints()[-1])
+                x = state.particles.position[0]
+                order = np.argsort(x)
+                problem, eos = state.config.problem, state.config.physics.eos_model()
+                exact = problem.exact(eos, state.time, state.particles.position)["density"]
+                panel.plot(x[order], exact[order], color="0.6")
+                panel.plot(x, state.particles.density, ".", ms=2.5, color=style.PALETTE[0])
+                panel.set_title(
+                    f"$C$ = {trial['value']:g}, {trial['verdict']}\n"
+                    f"energy drift {trial['drift']:.1g}",
+                    fontsize=10,
+                )
+            row[0].set_ylabel(rf"$\rho$  ({scheme.replace('_', ' ')})")
+        for panel in panels[-1]:
+            panel.set_xlabel("$x$")
+        picture.savefig(target / "stability_sod.png", dpi=100)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
+    parser.add_argument("-o", dest="directory", type=Path, default=Path("runs/stability"))
+    parser.add_argument("--only", action="append", choices=tuple(PROBLEMS), default=[])
+    parser.add_argument("--table", action="store_true", help="print what is there")
+    parser.add_argument("--pictures", type=Path, metavar="FOLDER", help="draw into FOLDER")
+    options = parser.parse_args()
+    os.environ["PYTHONPATH"] = os.pathsep.join([str(ROOT), os.environ.get("PYTHONPATH", "")])
+    if options.pictures:
+        pictures(options.directory, options.pictures)
+    elif not options.table:
+        search(options.directory, options.only)
+    print(table(options.directory, options.only))
+
+
+if __name__ == "__main__":
+    main()
