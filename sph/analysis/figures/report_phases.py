@@ -10,9 +10,9 @@ from sph.analysis.report.runs import STARTING
 
 MOST_BARS = 24
 
-# Tol's muted scheme, for things that lie next to each other.
+# Tol's muted scheme, for things that lie next to each other, and two more of his for the switches.
 PHASES = ("#332288", "#88CCEE", "#44AA99", "#117733", "#999933", "#DDCC77", "#CC6677", "#882255",
-          "#AA4499")  # fmt: skip
+          "#AA4499", "#6699CC", "#661100")  # fmt: skip
 OTHER = "0.87"
 
 
@@ -44,11 +44,10 @@ def phases(report: Report) -> Figure:
 
 
 def _bar_labels(report: Report, line: Series):
+    says_it = line.label.startswith(f"{line.sweep} = ")  # the sweep is called as what it varies
+    sweep = "" if says_it else line.sweep.replace("_", " ")
     for i in line.members:
-        yield (
-            i,
-            ", ".join(filter(None, [line.sweep, short(line.label), f"$N$ = {report.rows[i].n}"])),
-        )
+        yield i, ", ".join(filter(None, [sweep, short(line.label), f"$N$ = {report.rows[i].n}"]))
 
 
 def _seconds(row) -> dict[str, float]:

@@ -377,6 +377,14 @@ def test_several_sweeps_have_a_panel_each(tmp_path):
     assert drawn["Pareto front"] == [1.0, 1.0, 4.0, 4.0]  # of all: two lines of the first
     (switched,) = (label for label in drawn if "0.1 to 2.0" in label)
     assert drawn[switched] == [3.0, 12.0]
+    bars = pictures.phases(report).axes[0]
+    # a sweep that is called as what it varies is not named again
+    assert [label.get_text() for label in bars.get_yticklabels()][::2] == [
+        r"$\alpha$ = 1.0, $N$ = 100",
+        r"$\alpha$ = 2.0, $N$ = 100",
+        r"wide, $\alpha$ = 1.0, $N$ = 100",
+        r"wide, $\alpha$ = 0.1 to 2.0 (morris monaghan), $N$ = 100",
+    ]
     assert CliRunner().invoke(main, ["report", str(first), str(second)]).exit_code == 0
     assert "| wide | { min = 0.1, max = 2.0" in (first / "report" / "report.md").read_text()
 
