@@ -43,8 +43,8 @@ PROBLEMS = {
 }
 IDEAL_GAS_ONLY = {"pressure_energy": ("stiffened_tube",)}
 
-# Sod's tube at a C that is stable, the first that is not, and more; see `pictures`.
-SHOWN = 3
+# Values at which Sod's tube is drawn: stable, beyond and far beyond.
+SHOWN = {"physics.C": (0.25, 0.4, 0.6), "physics.eta": (1.2, 1.0, 0.85)}
 
 
 def combinations(only):
@@ -83,9 +83,9 @@ def search(directory: Path, only) -> None:
 def table(directory: Path, only) -> str:
     """A line for each problem and scheme that has been searched."""
     lines = [
-        "| problem | N, to t | scheme | C: stable up to | over its C | then | η: stable from | "
-        "to | its η | below, above |",
-        "| :--- | :--- | :--- | ---: | ---: | :--- | ---: | ---: | ---: | :--- |",
+        "| problem | N, to t | scheme | C: stable up to | over its C | then | run stops at "
+        "| η: stable from | to | its η | below, above |",
+        "| :--- | :--- | :--- | ---: | ---: | :--- | ---: | ---: | ---: | ---: | :--- |",
     ]
     for problem, scheme in combinations(only):
         target = directory / f"{problem}-{scheme}"
@@ -106,11 +106,12 @@ def _read(target: Path, key: str) -> dict:
     return {"failed": said.read_text()} if said.exists() else {}
 
 
-def _courant(found: dict) -> tuple[str, str, str]:
+def _courant(found: dict) -> tuple[str, str, str, str]:
     if "ends" not in found:
-        return ("reference fails" if found else "–", "", "")
+        return ("reference fails" if found else "–", "", "", "")
     end = found["ends"]["largest"]
-    return _value(end, ">"), _ratio(end), _why(found, end)
+    failed = [trial["value"] for trial in found["trials"] if trial["verdict"] == "failed"]
+    return _value(end, ">"), _ratio(end), _why(found, end), f"{min(failed):.2g}" if failed else ""
 
 
 def _eta(found: dict) -> tuple[str, str, str, str]:
@@ -146,43 +147,54 @@ def _why(found: dict, end: dict) -> str:
 
 
 def pictures(directory: Path, target: Path) -> None:
-    """Density of Sod's tube in each scheme: the last stable C, and runs beyond that still ended."""
+    """Density of Sod's tube in each scheme at SHOWN, with no limit on energy drift."""
+    from sph.analysis.figures import style
+
+    for key, values in SHOWN.items():
+        home = directory / f"sod-shown-{key}"
+        command = [
+            *(sys.executable, "-m", "sph.cli", "sweep", str(ROOT / "configs" / "sod.toml")),
+            *("--vary", f"physics.scheme={','.join(SCHEMES)}"),
+            *("--vary", f"{key}={','.join(map(str, values))}"),
+            *("--set", "problem.n=200", "--set", "physics.max_energy_drift=1e9"),
+            *("--jobs", "1", "--set", "run.threads=1", "-o", str(home)),
+        ]
+        subprocess.run(command, check=False)  # a run may fail: its panel says so
+        with style.paper():
+            picture = style.new_figure(9.0, 7.0)
+            panels = picture.subplots(len(SCHEMES), len(values), sharex=True, sharey=True)
+            for row, scheme in zip(panels, SCHEMES, strict=True):
+                row[0].set_ylabel(rf"$\rho$  ({scheme.replace('_', ' ')})")
+                for panel, value in zip(row, values, strict=True):
+                    _profile(panel, home / f"physics.scheme={scheme},{key}={value}")
+                    panel.set_title(f"{key} = {value}{panel.get_title()}", fontsize=10)
+            for panel in panels[-1]:
+                panel.set_xlabel("$x$")
+            # what has blown up goes off the panel rather than hide the rest
+            panels[0, 0].set_ylim(0.0, 1.5)
+            picture.savefig(target / f"stability_{key.partition('.')[2]}.png", dpi=100)
+
+
+def _profile(panel, directory: Path) -> None:
+    """The last density of a run, over the exact one; in the title its energy drift, or its end."""
     import numpy as np
 
     from sph.analysis.figures import style
     from sph.output import checkpoint
     from sph.output.run_directory import RunDirectory
 
-    with style.paper():
-        picture = style.new_figure(9.0, 7.0)
-        panels = picture.subplots(len(SCHEMES), SHOWN, sharex=True, sharey=True)
-        for row, scheme in zip(panels, SCHEMES, strict=True):
-            home = directory / f"sod-{scheme}"
-            found = _read(home, "physics.C")
-            inside = found["ends"]["largest"]["stable"]
-            shown = [
-                trial
-                for trial in found["trials"]
-                if trial["value"] >= inside and trial["verdict"] != "failed"
-            ]
-            shown = [*shown[:2], shown[-1]] if len(shown) >= SHOWN else shown
-            for panel, trial in zip(row, shown, strict=False):
-                state = checkpoint.read(RunDirectory(home / trial["name"]).checkpoints()[-1])
-                x = state.particles.position[0]
-                order = np.argsort(x)
-                problem, eos = state.config.problem, state.config.physics.eos_model()
-                exact = problem.exact(eos, state.time, state.particles.position)["density"]
-                panel.plot(x[order], exact[order], color="0.6")
-                panel.plot(x, state.particles.density, ".", ms=2.5, color=style.PALETTE[0])
-                panel.set_title(
-                    f"$C$ = {trial['value']:g}, {trial['verdict']}\n"
-                    f"energy drift {trial['drift']:.1g}",
-                    fontsize=10,
-                )
-            row[0].set_ylabel(rf"$\rho$  ({scheme.replace('_', ' ')})")
-        for panel in panels[-1]:
-            panel.set_xlabel("$x$")
-        picture.savefig(target / "stability_sod.png", dpi=100)
+    run = RunDirectory(directory)
+    summary = json.loads(run.summary.read_text())
+    state = checkpoint.read(run.checkpoints()[-1])
+    x = state.particles.position[0]
+    order = np.argsort(x)
+    problem, eos = state.config.problem, state.config.physics.eos_model()
+    exact = problem.exact(eos, state.time, state.particles.position)["density"]
+    panel.plot(x[order], exact[order], color="0.6")
+    panel.plot(x, state.particles.density, ".", ms=2.5, color=style.PALETTE[0])
+    drift = summary["conservation"]["energy_drift_max"]
+    ended = "" if summary["status"] == "done" else f", stopped at t = {summary['time']:.2g}"
+    panel.set_title(f", drift {drift:.1g}{ended}")
 
 
 def main() -> None:
