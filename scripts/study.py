@@ -128,11 +128,11 @@ STUDIES = {
     ),
     "sound_wave_2d": Study(
         "configs/sound_wave.toml",
-        "256,1024,2304",
+        "256,1024,4096",
         ("--field", "report.error_velocity_relative"),
         {
-            "eta_of_Wendland_C2": ("physics.eta=1.2,1.6,2.4",),
-            "eta_of_Wendland_C4": ("physics.kernel=wendland_c4", "physics.eta=2.4,3.2"),
+            "eta_of_Wendland_C2": ("physics.eta=1.6,2.0,2.4",),
+            "eta_of_Wendland_C4": ("physics.kernel=wendland_c4", "physics.eta=2.4,2.8"),
         },
         ("problem.dimension=2",),
     ),

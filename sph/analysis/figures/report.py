@@ -23,6 +23,7 @@ GUIDE = "0.55"
 ORDERS = (1, 2)  # of the guide lines
 MANY = 12  # lines of a legend beyond which its letters shrink
 MOST_COLUMNS = 3  # of panels
+WIDEST_WITHIN = 46  # letters of size 8 that a panel has room for
 LEGEND_SHARE = 0.055  # of a panel's height for a line of the legend within it
 
 
@@ -91,7 +92,7 @@ def _figure(report: Report, x, label: str, note: Callable[[Series], str], slopes
     if several:
         for panel, name in zip(panels, sweeps, strict=True):
             panel.set_title(name.replace("_", " "))
-            panel.legend(loc="lower left", fontsize=8, markerscale=0.8, borderaxespad=0.3)
+            _legend_within(panel)
         picture.suptitle(_title(report))
     else:
         panels[0].set_title(_title(report))
@@ -192,11 +193,20 @@ def _ticks(panel) -> None:
         axis.set_major_formatter(tick)
 
 
+def _legend_within(panel) -> None:
+    widest = max(map(_letters, panel.get_legend_handles_labels()[1]))
+    fontsize = 8 * min(1.0, WIDEST_WITHIN / widest)
+    panel.legend(loc="lower left", fontsize=fontsize, markerscale=0.8, borderaxespad=0.3)
+
+
+def _letters(label: str) -> int:
+    """Letters that are seen, roughly: a command of mathematics shows as one."""
+    return len(re.sub(r"\\\w+", "x", re.sub(r"[${}^]", "", label)))
+
+
 def _legend_below(picture: Figure, panel) -> None:
     handles, labels = panel.get_legend_handles_labels()
-    # letters that are seen, roughly: a command of mathematics shows as one
-    widest = max(len(re.sub(r"\\\w+", "x", re.sub(r"[${}^]", "", one))) for one in labels)
-    columns = 2 if widest < 55 and len(labels) > 2 else 1
+    columns = 2 if max(map(_letters, labels)) < 55 and len(labels) > 2 else 1
     picture.set_figheight(4.4 + 0.22 * math.ceil(len(labels) / columns))
     picture.legend(
         handles, labels, loc="outside lower center", ncols=columns, markerscale=0.7,
