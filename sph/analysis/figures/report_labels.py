@@ -12,8 +12,7 @@ def short(label: str) -> str:
 
     A range to switch in, {min = 0.1, max = 2.0}, is 0.1 to 2.0, and further keys follow it.
     """
-    label = re.sub(r"\{\s*min = ([^,}]+), max = ([^,}]+?)\s*([,}])", r"\1 to \2\3", label)
-    label = re.sub(r" to ([^,}]+)(?:, \w+ = \"?(\w+)\"?)?\s*\}", _closed, label)
+    label = re.sub(r"\{\s*min = ([^,}]+), max = ([^,}]+?)\s*(,[^}]*)?\}", _range, label)
     found = re.sub(r"(^|, )(\w+)(?= = )", lambda key: key[1] + SYMBOLS.get(key[2], key[2]), label)
     return found.replace("_", " ")
 
@@ -44,5 +43,6 @@ def order(line: Series) -> str:
     return "" if line.order is None else f"order {line.order:.2f}"
 
 
-def _closed(found: re.Match) -> str:
-    return f" to {found[1]}" + (f" ({found[2]})" if found[2] else "")
+def _range(found: re.Match) -> str:
+    rest = re.sub(r'switch = |"', "", found[3] or "").strip(" ,")
+    return f"{found[1]} to {found[2]}" + (f" ({rest})" if rest else "")

@@ -395,6 +395,10 @@ def test_labels_of_pictures():
     assert labels.short("kernel = wendland_c2, eta = 1.6") == r"kernel = wendland c2, $\eta$ = 1.6"
     table = '{ min = 0.02, max = 2.0, switch = "cullen_dehnen" }'
     assert labels.short(f"alpha = {table}") == r"$\alpha$ = 0.02 to 2.0 (cullen dehnen)"
+    table = '{ min = 0.1, max = 2.0, switch = "cullen_dehnen", ell = 0.05 }'
+    assert labels.short(f"alpha = {table}, C = 0.3") == (
+        r"$\alpha$ = 0.1 to 2.0 (cullen dehnen, ell = 0.05), $C$ = 0.3"
+    )
     assert labels.value_alone("scheme = grad_h") == "grad_h"
     assert labels.value_alone("eta = 1.6") == "eta = 1.6"
 
