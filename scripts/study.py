@@ -18,10 +18,13 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import NamedTuple
 
+from PIL import Image
+
 HOME = Path(__file__).resolve().parent.parent
 RUNS = Path("runs/studies")
 RESULTS = Path("docs/studies")
 POINT_FAILED = 3  # of a sweep: the report lists such points, and settings that fail tell something
+WIDEST = 900  # pixels of maps, which would fill the repository otherwise
 PACKAGES = ("numba", "llvmlite", "numpy")
 
 
@@ -140,7 +143,7 @@ STUDIES = {
     "square": Study(
         "configs/square.toml",
         "448,1792",
-        ("--field", "report.shape_error"),
+        ("--field", "internal_energy"),
         {
             "scheme": SCHEME,
             "pressure_energy_kernel": (
@@ -199,6 +202,11 @@ def carry_out(name: str, jobs: int) -> None:
         ended = subprocess.run([sys.executable, "-m", "sph.cli", *command[1:]], cwd=HOME)
         if ended.returncode not in (0, POINT_FAILED):
             sys.exit(ended.returncode)
+    picture = HOME / RESULTS / name / "runs.png"
+    if picture.is_file():
+        with Image.open(picture) as drawn:
+            drawn.thumbnail((WIDEST, WIDEST))
+            drawn.convert("RGB").quantize(256).save(picture, optimize=True)
     (HOME / RESULTS / name / "report.json").unlink()  # the same as report.csv, at thrice the size
     lines = "\n".join(map(shlex.join, called))
     (HOME / RESULTS / name / "made_by.md").write_text(

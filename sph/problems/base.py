@@ -39,12 +39,14 @@ class Problem(Section):
                  configuration must keep, each with the reason for the number
       ideal_gas  whether its solution is that of an ideal gas, so that others are refused
       radial     whether, in 2-D and 3-D, the solution depends on the distance from `centre` alone
+      profiled   whether profiles over x, or that distance, show the solution; maps do else
     """
 
     defaults: ClassVar[dict[str, Any]] = {}
     limits: ClassVar[dict[str, Limit]] = {}
     ideal_gas: ClassVar[bool] = False
     radial: ClassVar[bool] = False
+    profiled: ClassVar[bool] = True
 
     name: str = Field(description="which problem: `sph list` names them")
     dimension: int = Field(ge=1, le=3, description="number of space dimensions")

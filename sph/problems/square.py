@@ -29,6 +29,7 @@ class Problem(base.Problem):
         "time.end": 8.0,
         "output.interval": 1.0,
     }
+    profiled: ClassVar = False
     limits: ClassVar = {
         "energy_drift": base.Limit(
             1e-4, "gas that hardly moves: kinetic energy stays below some 1e-3 of the whole"
@@ -71,16 +72,16 @@ class Problem(base.Problem):
         """Shape of the dense gas.
 
         squareness: sum r^4 cos 4 phi / sum r^4 of the dense particles, relative to that of a
-        square: 1 as long as it is one, 0 for a disc, negative for a diamond. shape_error: how far
-        it is from 1. dense_outside: the share of them that is outside the square.
+        square: 1 as long as it is one, 0 for a disc, negative for a diamond, and above 1 where the
+        sides are drawn in. dense_outside: the share of them that is outside the square, 0.09 for a
+        disc. The error of the internal energy, which particles carry with them, tells the same: it
+        is 2.8 times the area that holds the wrong gas.
         """
         dense = particles.position[:, particles.id <= self._cells() ** 2]
         outside = np.abs(dense).max(axis=0) > HALF
         start = _fourfold(self._dense_lattice())
-        squareness = _fourfold(dense) / start
         return {
-            "squareness": squareness,
-            "shape_error": abs(1.0 - squareness),
+            "squareness": _fourfold(dense) / start,
             "dense_outside": float(outside.mean()),
         }
 

@@ -178,7 +178,7 @@ def shape(problem, state, identity, position):
 def test_report_tells_square_disc_and_diamond_apart():
     problem, state, identity = square_state(7168)
     unmoved = shape(problem, state, identity, state.position)
-    assert unmoved == {"squareness": 1.0, "shape_error": 0.0, "dense_outside": 0.0}
+    assert unmoved == {"squareness": 1.0, "dense_outside": 0.0}
     # a disc of the area of the square, filled evenly along a spiral of the golden angle
     count = np.arange((identity <= 64**2).sum())
     radius = 0.5 / np.sqrt(np.pi) * np.sqrt((count + 0.5) / count.size)

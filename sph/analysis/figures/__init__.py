@@ -60,7 +60,7 @@ def _kind(state: State) -> str:
 
 
 def _shows_profiles(state: State) -> bool:
-    return state.dimension == 1 or state.has_exact
+    return state.dimension == 1 or (state.has_exact and state.problem.profiled)
 
 
 def _draw_own(source: Source) -> list[Path]:

@@ -1,5 +1,6 @@
 """Maps of 2-D runs and slices through the middle of 3-D runs, interpolated with the kernel."""
 
+import textwrap
 from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
@@ -13,6 +14,7 @@ from sph.analysis.interpolate import Plane, onto_plane
 PIXELS = 512  # on the longer side
 PIXELS_OF_MANY = 320
 LONGEST_SIDE = 3.6  # inches, of a map that stands with one other
+LONGEST_TITLE = 40  # letters in a line above a map that stands with others
 WIDEST = 9.0  # inches, of a picture of many maps
 
 
@@ -88,7 +90,7 @@ def _side_by_side(drawn: Sequence[_Density]) -> Figure:
     panels = figure.subplots(rows, columns, squeeze=False)
     for panel, one in zip(panels.flat, drawn, strict=False):
         image = _show(panel, one.values, one.plane, "density", scale)
-        panel.set_title(one.label)
+        panel.set_title(textwrap.fill(one.label, LONGEST_TITLE))
     shown, empty = np.split(panels.ravel(), [len(drawn)])
     for panel in empty:
         panel.remove()

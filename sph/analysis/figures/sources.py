@@ -63,9 +63,27 @@ def find_source(path: Path) -> Source:
 
 
 def labels(sources: Sequence[Source]) -> list[str]:
-    """A name for each; whole paths where the short names do not tell them apart."""
+    """A name for each; whole paths where the short names do not tell them apart.
+
+    Of points of a sweep, TABLE.KEY=VALUE,…, only what not all of them have, without the tables.
+    """
     short = [source.label for source in sources]
-    return short if len(set(short)) == len(short) else [str(source.path) for source in sources]
+    if len(set(short)) < len(short):
+        return [str(source.path) for source in sources]
+    parts = [name.split(",") for name in short]
+    if len(parts) == 1 or not all("=" in part for name in parts for part in name):
+        return short
+    shared = set.intersection(*map(set, parts))
+    told = [
+        ", ".join(_without_table(part) for part in name if part not in shared) for name in parts
+    ]
+    return told if all(told) else short
+
+
+def _without_table(setting: str) -> str:
+    """eta=1.6 of physics.eta=1.6."""
+    key, _, value = setting.partition("=")
+    return f"{key.rpartition('.')[2]}={value}"
 
 
 @dataclass(frozen=True)

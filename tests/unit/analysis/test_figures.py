@@ -103,7 +103,9 @@ def test_the_run_of_every_problem_draws(tmp_path, problem):
     states = [state_of(problem, time=0.0), state_of(problem)]
     run = write_run(tmp_path / "run", states)
     drawn = figures.draw([run.path])
-    expected = SETS[states[0].dimension] | ({"profiles"} if states[-1].has_exact else set())
+    expected = SETS[states[0].dimension] | (
+        {"profiles"} if states[-1].has_exact and states[0].problem.profiled else set()
+    )
     assert {path.stem for path in drawn} == expected
     for path in drawn:
         assert path.parent == run.figures
