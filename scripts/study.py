@@ -80,7 +80,7 @@ STUDIES = {
     "point_explosion": Study(
         "configs/point_explosion.toml",
         "4096,13824",
-        ("--field", "density"),
+        ("--field", "report.momentum_radius_error"),
         {
             "scheme": SCHEME,
             "eta": ("physics.eta=1.2,1.4,1.6",),
