@@ -132,7 +132,7 @@ STUDIES = {
     ),
     "sound_wave_2d": Study(
         "configs/sound_wave.toml",
-        "256,1024,4096",
+        "576,1024,4096",
         ("--field", "report.error_velocity_relative"),
         {
             "eta_of_Wendland_C2": ("physics.eta=1.6,2.0,2.4",),
