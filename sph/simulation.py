@@ -301,5 +301,7 @@ class Simulation:
         """Step 8, the sums of the history, and whether the state means anything."""
         with self.clock.phase("step size, sums"):
             self.totals = totals.of(self.particles, self.scene.external)
-            self.limit = step_size.limit(self._bounds, self.particles, self._signal_speed, past)
+            self.limit = step_size.limit(
+                self._bounds, self.particles, self._signal_speed, self._div_v, past
+            )
             self.watchdog.check(self)

@@ -1,9 +1,11 @@
 """The global time step (seed eq 32), what else bounds it, and the particle that sets it.
 
-Eq 32 takes the rates of this moment for those of the whole step. Two bounds beside it hold where
-they change faster: a support may change by SUPPORT_CHANGE of itself, and a step may be GROWTH times
-as long as the one before, so that a flow that has just been stiff is not left in one leap. A field
-from outside, where there is one, bounds it by C (H/|a|)^(1/2). No step is longer than the run.
+Eq 32 knows of no gas that parts: v_sig counts approach alone, and in a fast expansion it would let
+particles leave each other in one step. So a support may change by SUPPORT_CHANGE of itself: by
+dH/dt = H div v/D where the scene has the divergence, else as far as it changed in the last step. A
+step may be GROWTH times as long as the one before, so that a flow that has just been stiff is not
+left in one leap. A field from outside, where there is one, bounds it by C (H/|a|)^(1/2). No step is
+longer than the run.
 """
 
 from typing import NamedTuple
@@ -83,23 +85,47 @@ def _largest_change(support, before, identity):
     return largest, particle
 
 
-def limit(bounds: Bounds, particles, signal_speed, past: Past | None) -> StepLimit:
-    """The coming step; signal_speed (N,) is each particle's largest v_sig; no past at the start."""
+@njit(**COMPILED)
+def _fastest_change(divergence, identity):
+    """Largest |div v|, and whose it is."""
+    largest = 0.0
+    particle = 0
+    for i in range(divergence.size):
+        rate = abs(divergence[i])
+        if rate > largest or (rate == largest and identity[i] < particle):
+            largest, particle = rate, identity[i]
+    return largest, particle
+
+
+def limit(bounds: Bounds, particles, signal_speed, divergence, past: Past | None) -> StepLimit:
+    """The coming step; signal_speed (N,) is each particle's largest v_sig.
+
+    divergence (N,) of velocity, None in scenes without; no past at the start.
+    """
     p = particles
     dt, particle, criterion = _smallest(
         p.support, signal_speed, p.internal_energy, p.energy_rate,
         p.acceleration if bounds.acceleration else None, p.id, bounds.energy,
     )  # fmt: skip
     dt, criterion = bounds.courant * dt, CRITERIA[criterion]
-    if past is not None:
-        change, changed = _largest_change(p.support, past.support, p.id)
-        # less than this cannot become too much in one step; it may be the iteration of H, which
-        # goes on however short the step
-        noticed = change > SUPPORT_CHANGE / GROWTH
-        if noticed and change * dt > SUPPORT_CHANGE * past.dt:
-            dt, particle, criterion = SUPPORT_CHANGE * past.dt / change, changed, "support"
-        if dt > GROWTH * past.limit:
-            dt, particle, criterion = GROWTH * past.limit, 0, "growth"
+    rate, changed = _rate_of_supports(p, divergence, past)
+    if rate * dt > SUPPORT_CHANGE:
+        dt, particle, criterion = SUPPORT_CHANGE / rate, changed, "support"
+    if past is not None and dt > GROWTH * past.limit:
+        dt, particle, criterion = GROWTH * past.limit, 0, "growth"
     if dt > bounds.end:
         dt, particle, criterion = bounds.end, 0, "end"
     return StepLimit(dt, int(particle), criterion)
+
+
+def _rate_of_supports(particles, divergence, past: Past | None) -> tuple[float, int]:
+    """Largest |dH/dt|/H, and whose it is."""
+    if divergence is not None:
+        rate, particle = _fastest_change(divergence, particles.id)
+        return rate / particles.position.shape[0], particle
+    if past is None:
+        return 0.0, 0
+    change, particle = _largest_change(particles.support, past.support, particles.id)
+    # less than this cannot become too much in one step; it may be the iteration of H, which goes on
+    # however short the step
+    return (change / past.dt if change > SUPPORT_CHANGE / GROWTH else 0.0), particle

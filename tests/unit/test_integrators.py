@@ -59,6 +59,7 @@ def test_a_number_that_is_none_is_not_hidden():
 def particles(**changed):
     """Two particles; the first alone would take a step of 2 H/v_sig = 0.2."""
     arrays = {
+        "position": np.zeros((2, 2)),
         "support": np.array([0.1, 0.2]),
         "internal_energy": np.ones(2),
         "energy_rate": np.zeros(2),
@@ -73,58 +74,69 @@ ALL = Bounds(courant=0.5, energy=True, acceleration=True, end=100.0)
 
 
 def test_the_signal_speed_bounds_the_step():
-    assert step_size.limit(ALL, particles(), SIGNALS, None) == (0.1, 8, "signal_speed")
+    assert step_size.limit(ALL, particles(), SIGNALS, None, None) == (0.1, 8, "signal_speed")
 
 
 def test_heating_bounds_the_step_where_asked():
     rates = np.array([0.0, -10.0])
-    limit = step_size.limit(ALL, particles(energy_rate=rates), SIGNALS, None)
+    limit = step_size.limit(ALL, particles(energy_rate=rates), SIGNALS, None, None)
     assert limit == (0.05, 5, "energy")
     free = ALL._replace(energy=False)
-    limit = step_size.limit(free, particles(energy_rate=rates), SIGNALS, None)
+    limit = step_size.limit(free, particles(energy_rate=rates), SIGNALS, None, None)
     assert limit.criterion == "signal_speed"
 
 
 def test_gas_without_any_energy_does_not_stop_the_run():
     cold = particles(internal_energy=np.zeros(2), energy_rate=np.array([1.0, 0.0]))
-    assert step_size.limit(ALL, cold, SIGNALS, None) == (0.1, 8, "signal_speed")
+    assert step_size.limit(ALL, cold, SIGNALS, None, None) == (0.1, 8, "signal_speed")
 
 
 def test_a_pull_from_outside_bounds_the_step():
     pulled = particles(acceleration=np.array([[0.0, 2000.0]]))
     # 0.5 sqrt(0.2/2000), two roots and a product of rounding
-    assert step_size.limit(ALL, pulled, SIGNALS, None) == (
+    assert step_size.limit(ALL, pulled, SIGNALS, None, None) == (
         pytest.approx(0.005, rel=1e-15), 5, "acceleration",
     )  # fmt: skip
     without = ALL._replace(acceleration=False)
-    assert step_size.limit(without, pulled, SIGNALS, None).criterion == "signal_speed"
+    assert step_size.limit(without, pulled, SIGNALS, None, None).criterion == "signal_speed"
 
 
 def test_a_support_may_not_change_by_more_than_its_part():
     """It halved in a step of 0.01: at that pace 0.2 of it takes 0.002."""
     past = Past(dt=0.01, limit=1.0, support=np.array([0.1, 0.4]))
-    limit = step_size.limit(ALL, particles(), SIGNALS, past)
+    limit = step_size.limit(ALL, particles(), SIGNALS, None, past)
     assert limit == (pytest.approx(0.002, rel=1e-15), 5, "support")
     grown = Past(dt=0.01, limit=1.0, support=np.array([0.1, 0.1]))
-    assert step_size.limit(ALL, particles(), SIGNALS, grown).dt == pytest.approx(0.002)
+    assert step_size.limit(ALL, particles(), SIGNALS, None, grown).dt == pytest.approx(0.002)
+
+
+def test_gas_that_parts_bounds_the_step():
+    """In 2-D supports grow by div v/2: 0.2 of them takes 0.004."""
+    parting = np.array([100.0, -20.0])
+    limit = step_size.limit(ALL, particles(), SIGNALS, parting, None)
+    assert limit == (pytest.approx(0.004, rel=1e-15), 8, "support")
+    past = Past(dt=0.01, limit=1.0, support=np.array([0.1, 0.4]))  # is not asked then
+    assert step_size.limit(ALL, particles(), SIGNALS, parting, past) == limit
+    slow = np.array([1.0, -2.0])
+    assert step_size.limit(ALL, particles(), SIGNALS, slow, past).criterion == "signal_speed"
 
 
 def test_supports_that_settle_in_a_tiny_step_are_no_reason_for_another():
     past = Past(dt=1e-9, limit=0.1, support=np.array([0.1, 0.201]))
-    assert step_size.limit(ALL, particles(), SIGNALS, past).criterion == "signal_speed"
+    assert step_size.limit(ALL, particles(), SIGNALS, None, past).criterion == "signal_speed"
 
 
 def test_a_step_grows_by_its_factor_at_most():
     past = Past(dt=1e-3, limit=1e-3, support=np.array([0.1, 0.2]))
-    limit = step_size.limit(ALL, particles(), SIGNALS, past)
+    limit = step_size.limit(ALL, particles(), SIGNALS, None, past)
     assert limit == (pytest.approx(1.5e-3), 0, "growth")
 
 
 def test_a_step_cut_to_land_on_an_output_does_not_shorten_the_next():
     past = Past(dt=1e-9, limit=0.1, support=np.array([0.1, 0.2]))
-    assert step_size.limit(ALL, particles(), SIGNALS, past).dt == 0.1
+    assert step_size.limit(ALL, particles(), SIGNALS, None, past).dt == 0.1
 
 
 def test_gas_in_which_nothing_moves_takes_one_step():
-    limit = step_size.limit(ALL, particles(internal_energy=np.zeros(2)), np.zeros(2), None)
+    limit = step_size.limit(ALL, particles(internal_energy=np.zeros(2)), np.zeros(2), None, None)
     assert limit == (100.0, 0, "end")
