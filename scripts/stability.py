@@ -55,29 +55,37 @@ def combinations(only):
                 yield problem, scheme
 
 
+def searches(only):
+    """(problem, scheme, key) in the order they are made: a scheme's largest C come first."""
+    for scheme in SCHEMES:
+        for key in KEYS:
+            yield from (
+                (problem, scheme, key) for problem, one in combinations(only) if one == scheme
+            )
+
+
 def search(directory: Path, only) -> None:
     """Make what is missing; what a search that exits with 3 said is kept for the table."""
-    for key in KEYS:
-        for problem, scheme in combinations(only):
-            target = directory / f"{problem}-{scheme}"
-            words = target / f"{key}.said"
-            if words.exists():
-                continue
-            sets = {"physics.scheme": scheme, "run.threads": 1, **PROBLEMS[problem]}
-            command = [
-                sys.executable, "-m", "sph.cli", "stability",
-                str(ROOT / "configs" / f"{problem}.toml"), "--key", key, "--jobs", "1",
-                "-o", str(target),
-                *(part for name in sets for part in ("--set", f"{name}={sets[name]}")),
-            ]  # fmt: skip
-            done = subprocess.run(command, capture_output=True, text=True, check=False)
-            said = (done.stdout + done.stderr).strip()
-            print(f"{problem} {scheme} {key}: exit {done.returncode}\n{done.stdout}", flush=True)
-            if done.returncode in (0, 3):
-                target.mkdir(parents=True, exist_ok=True)
-                words.write_text(said)
-            else:
-                print(said, flush=True)
+    for problem, scheme, key in searches(only):
+        target = directory / f"{problem}-{scheme}"
+        words = target / f"{key}.said"
+        if words.exists():
+            continue
+        sets = {"physics.scheme": scheme, "run.threads": 1, **PROBLEMS[problem]}
+        command = [
+            sys.executable, "-m", "sph.cli", "stability",
+            str(ROOT / "configs" / f"{problem}.toml"), "--key", key, "--jobs", "1",
+            "-o", str(target),
+            *(part for name in sets for part in ("--set", f"{name}={sets[name]}")),
+        ]  # fmt: skip
+        done = subprocess.run(command, capture_output=True, text=True, check=False)
+        said = (done.stdout + done.stderr).strip()
+        print(f"{problem} {scheme} {key}: exit {done.returncode}\n{done.stdout}", flush=True)
+        if done.returncode in (0, 3):
+            target.mkdir(parents=True, exist_ok=True)
+            words.write_text(said)
+        else:
+            print(said, flush=True)
 
 
 def table(directory: Path, only) -> str:
