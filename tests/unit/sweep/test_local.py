@@ -149,7 +149,7 @@ def test_nobody_runs_a_point_that_another_process_is_at(program):
         task.run.path.mkdir()
         task.run.write_summary({"status": "done"})
     waiting.join(10.0)
-    assert found == [("problem.n=40", "done", "", "")]
+    assert found == [("problem.n=40", "done", "", "", 0)]
 
 
 def test_an_orphan_keeps_its_lock(program, tmp_path):
