@@ -149,7 +149,7 @@ STUDIES = {
             "pressure_energy_kernel": (
                 "physics.scheme=pressure_energy",
                 "physics.kernel=wendland_c2,wendland_c4",
-                "physics.eta=1.6,2.0,2.4",
+                "physics.eta=1.6,1.8,2.0,2.4",
             ),
             "pressure_energy_alpha": (
                 "physics.scheme=pressure_energy",
@@ -161,7 +161,7 @@ STUDIES = {
             "scheme/problem.n=1792,physics.scheme=variational",
             "scheme/problem.n=1792,physics.scheme=pressure_energy",
             "pressure_energy_kernel/problem.n=1792,physics.scheme=pressure_energy,"
-            "physics.kernel=wendland_c4,physics.eta=2.4",
+            "physics.kernel=wendland_c4,physics.eta=1.8",
         ),
     ),
 }
