@@ -170,7 +170,7 @@ def test_riemann_states(scene, densities, pressures, mach, direction, equal_mass
     mass = 0.5 * rho[side] / count[side]
     state = InitialState(x[None], v[side][None], mass, (P / (0.4 * rho))[side])
     words = attempt(state, 1, boundary, scene)
-    if equal_masses and words:
+    if mass.max() < 10.0 * mass.min() and words:  # 48 particles cannot be alike at any contrast
         assert "needs a kernel support" in words
 
 
