@@ -55,7 +55,7 @@ def draw(runs: list[RunDirectory]):
     t = np.linspace(0.0, config.time.end, 151)
     theory = problem.theory(physics.eos_model(), t)["mode_amplitude"]
     panel.plot(t, theory, "--", color=style.EXACT, label="linear theory")
-    panel.plot(SWIFT_TIMES, SWIFT, "o", color="grey", label="SWIFT, PEERS figure (SPHENIX, 128²)")
+    panel.plot(SWIFT_TIMES, SWIFT, "o", color="grey", label="SWIFT 2026.04, SPHENIX, 128²")
     panel.axvspan(*GROWTH, color="black", alpha=0.06, lw=0)
     panel.set(xlabel="$t$", ylabel="mode amplitude of $v_y$", yscale="log", ylim=(6e-3, 0.6))
     panel.legend(loc="upper left", fontsize=8)
