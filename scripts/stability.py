@@ -19,7 +19,8 @@ ROOT = Path(__file__).parents[1]
 SCHEMES = ("grad_h", "variational", "pressure_energy")
 KEYS = ("physics.C", "physics.eta")
 
-# Shipped configurations, and what makes them small.
+# Shipped configurations, and what makes them small. Not too short: an instability needs some tens
+# of steps to be seen, at the largest C as well.
 PROBLEMS = {
     "sod": {"problem.n": 200},
     "strong_shock": {"problem.n": 300},
@@ -28,17 +29,17 @@ PROBLEMS = {
     "shu_osher": {"problem.n": 400},
     "sound_wave": {"problem.n": 64},
     "stiffened_tube": {"problem.n": 300},
-    "uniform": {"problem.n": 256},
+    "uniform": {"problem.n": 256, "time.end": 2.0},
     "point_explosion_2d": {"problem.n": 1024},
-    "gresho": {"problem.n": 576, "time.end": 0.2},
+    "gresho": {"problem.n": 576},
     "square": {"problem.n": 448, "time.end": 0.5},
     "kelvin_helmholtz_smooth": {"problem.n": 576, "time.end": 0.3},
     "kelvin_helmholtz": {"problem.n": 1530, "time.end": 0.2},
-    "yee": {"problem.n": 1024, "time.end": 1.0},
+    "yee": {"problem.n": 1024},
     "point_explosion": {"problem.n": 1728},
     "expanding_ball": {"problem.n": 500, "time.end": 0.5},
     "contrast": {},
-    "blob": {"problem.n": 1000, "time.end": 0.5},
+    "blob": {"problem.n": 1000, "time.end": 3.0},
     "keplerian_ring": {"problem.n": 500, "time.end": 3.0},
 }
 IDEAL_GAS_ONLY = {"pressure_energy": ("stiffened_tube",)}
@@ -91,9 +92,9 @@ def search(directory: Path, only) -> None:
 def table(directory: Path, only) -> str:
     """A line for each problem and scheme that has been searched."""
     lines = [
-        "| problem | N, to t | scheme | C: stable up to | over its C | then | run stops at "
-        "| η: stable from | to | its η | below, above |",
-        "| :--- | :--- | :--- | ---: | ---: | :--- | ---: | ---: | ---: | ---: | :--- |",
+        "| problem | N, to t | scheme | C: stable up to | over its C | then | steps there "
+        "| run stops at | η: stable from | to | its η | below, above |",
+        "| :--- | :--- | :--- | ---: | ---: | :--- | ---: | ---: | ---: | ---: | ---: | :--- |",
     ]
     for problem, scheme in combinations(only):
         target = directory / f"{problem}-{scheme}"
@@ -114,12 +115,14 @@ def _read(target: Path, key: str) -> dict:
     return {"failed": said.read_text()} if said.exists() else {}
 
 
-def _courant(found: dict) -> tuple[str, str, str, str]:
+def _courant(found: dict) -> tuple[str, str, str, str, str]:
     if "ends" not in found:
-        return ("reference fails" if found else "–", "", "", "")
+        return ("reference fails" if found else "–", "", "", "", "")
     end = found["ends"]["largest"]
     failed = [trial["value"] for trial in found["trials"] if trial["verdict"] == "failed"]
-    return _value(end, ">"), _ratio(end), _why(found, end), f"{min(failed):.2g}" if failed else ""
+    steps = (str(one["steps"]) for one in found["trials"] if one["value"] == end["stable"])
+    stops = f"{min(failed):.2g}" if failed else ""
+    return _value(end, ">"), _ratio(end), _why(found, end), next(steps, ""), stops
 
 
 def _eta(found: dict) -> tuple[str, str, str, str]:

@@ -10,6 +10,9 @@ from pathlib import Path
 from sph.output.files import explained, write_text
 from sph.stability.command import Found
 
+# Of a run at the limit, below which it hardly tells: an instability needs some tens to be seen.
+FEW_STEPS = 30
+
 COLUMNS = ("value", "verdict", "error_over_limit", "field", "energy_drift", "steps", "cpu_seconds",
            "name", "reason")  # fmt: skip
 
@@ -22,6 +25,12 @@ def in_words(found: Found) -> str:
     ]
     for end in found.edges:
         lines.append(_of_an_end(found, end))
+        inside = found.edges[end].inside
+        if inside is not None and found.at(inside).steps < FEW_STEPS:
+            lines.append(
+                f"  There a run has {found.at(inside).steps} steps, too few for an instability to "
+                "show: a larger time.end would tell more."
+            )
         if islands := found.islands(end):
             lines.append(
                 f"  It is not one range: stable again at {', '.join(f'{x:g}' for x in islands)}."

@@ -60,6 +60,9 @@ def test_a_search_finds_the_largest_stable_courant_number(searched):
     assert verdicts[end["unstable"]] in ("beyond", "failed")
     assert max(verdicts) <= 64 * 0.15
     assert f"physics.C: stable up to {end['stable']:g}" in result.output
+    steps = next(one["steps"] for one in found["trials"] if one["value"] == end["stable"])
+    assert steps < table.FEW_STEPS  # of so short a run
+    assert f"There a run has {steps} steps, too few" in result.output
     assert (target / "physics.C.png").stat().st_size > 10_000
     with (target / "physics.C.csv").open() as file:
         lines = list(csv.DictReader(file))
