@@ -1,6 +1,6 @@
 """Where supports are hard to find: too few particles, too many in one place, masses far apart.
 
-Particles are handed in as they are. Each guard is taken out once, and its case fails.
+Particles are handed in as they are.
 """
 
 import dataclasses
