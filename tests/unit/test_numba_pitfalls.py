@@ -316,6 +316,9 @@ def test_running_extremes_and_divisions_are_vectorised():
 
 
 @avx2_only
+@pytest.mark.skipif(
+    bool(os.environ.get("NUMBA_BOUNDSCHECK")), reason="checks of bounds keep loops from it"
+)
 def test_pair_loops_of_the_passes_are_vectorised(first_steps):
     packed = first_steps[0]["packed"]
     assert packed["density"]["vsqrtpd"] >= 1  # the distances
