@@ -18,9 +18,16 @@ HEAD = (
     "| problem | code | particles | steps | CPU s | whole process "
     "| L1 density | velocity | pressure | energy |"
 )
-COLOURS = {OWN: "#c0392b"}
-OTHERS = ("#1f4e79", "#2e8b57", "#8e6bbf", "#b8860b")
-MARKERS = "sD^vPX"
+# One look for a scheme in all panels.
+LOOKS = {
+    OWN: ("#c0392b", "o"),
+    "PySPH adke": ("#1f4e79", "s"),
+    "PySPH mpm": ("#2e8b57", "D"),
+    "PySPH gsph": ("#8e6bbf", "^"),
+    "PySPH tsph": ("#b8860b", "v"),
+    "PySPH crksph": ("#17869e", "P"),
+}
+OTHER = ("#555555", "X")
 
 
 def write(rows: list[dict], directory: Path):
@@ -129,14 +136,13 @@ def picture(rows: list[dict], path: Path, field: str = "density"):
 
 
 def _panel(axis, case, rows, field):
-    codes = list(dict.fromkeys(row["code"] for row in rows))
-    for k, code in enumerate(codes):
+    failures = []
+    for code in dict.fromkeys(row["code"] for row in rows):
         runs = [row for row in _ended(rows, case) if row["code"] == code]
         if not runs:
-            axis.plot([], [], " ", label=f"{code}: {rows_failure(rows, code)}")
+            failures.append(f"\n{code}: {rows_failure(rows, code)}")
             continue
-        colour = COLOURS.get(code) or OTHERS[(k - 1) % len(OTHERS)]
-        marker = "o" if code == OWN else MARKERS[(k - 1) % len(MARKERS)]
+        colour, marker = LOOKS.get(code, OTHER)
         cost = [row["cpu_seconds"] for row in runs]
         error = [row["L1"][field] for row in runs]
         axis.loglog(cost, error, marker=marker, color=colour, label=code, lw=1.6, ms=6)
@@ -153,7 +159,7 @@ def _panel(axis, case, rows, field):
                 ha="right" if code == OWN else "left",
             )
     axis.set_title(case, fontsize=11)
-    axis.set_xlabel("CPU seconds")
+    axis.set_xlabel("CPU seconds" + "".join(failures))
     axis.set_ylabel(f"L1 error of {field}")
     axis.margins(0.15)
     axis.yaxis.set_major_formatter(matplotlib.ticker.LogFormatter(minor_thresholds=(2, 1)))
