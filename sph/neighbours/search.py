@@ -7,7 +7,7 @@ from numba import njit
 
 from sph.compiled import COMPILED
 from sph.errors import NumericalError
-from sph.neighbours import lists, order, tree
+from sph.neighbours import first_guess, lists, order, tree
 from sph.neighbours.order import BLOCK
 
 # Room for supports to grow between two builds. Where it falls short the pass is done once more.
@@ -104,7 +104,9 @@ class Search:
         """Supports (N,) to begin with, none so wide that lists cannot serve it."""
         least = 1e-9 * self.domain.largest_side  # where all particles are in one place
         most = min(self.domain.longest_reach / (1 + 2 * GROWTH), self.domain.largest_side)
-        return np.clip(first_guess(position, ratio), least, most)
+        guess = np.clip(first_guess.from_spacing(position, ratio), least, most)
+        first_guess.trim(position, ratio, least, guess)
+        return guess
 
     def order(self, position, identity) -> np.ndarray:
         """The block order of these particles, (N,) indices."""
@@ -139,45 +141,3 @@ class Search:
                 factor > 1.0, np.maximum(support, np.minimum(2.0 * support, room)), support
             )
         self.build(Origin(position.copy(), support, self.origin.skin), identity)
-
-
-# Levels of the tree, from the blocks upwards, at which the spacing is read: 8 to 64 particles.
-GUESS_LEVELS = 4
-
-
-@njit(**COMPILED, forceinline=True)
-def _spacing(lower, upper, n):
-    """Spacing s of n particles in a box: s apart along axes, they span prod (e + s) = n s^D."""
-    D = lower.size
-    extent = upper - lower
-    spacing = extent.max()
-    for _ in range(30):  # a contraction: each pass halves the error at the least
-        spacing = (np.prod(extent + spacing) / n) ** (1 / D)
-    return spacing
-
-
-@njit(**COMPILED)
-def first_guess(position, ratio):
-    """Supports to begin the search of the true ones with, (N,), for positions in block order.
-
-    ratio = (H/h) eta times the least spacing of the boxes that hold the particle. (A box that cuts
-    through planes of a lattice, or a gradient of density, shows too wide a spacing: supports that
-    begin too wide cost lists of many candidates, ones too narrow only a second build.)
-    """
-    n = position.shape[1]
-    first, last, lower, upper, _ = tree.build(position, np.zeros(n))
-    # where particles coincide there is no spacing to be seen: begin from a small support
-    least = 1e-6 * _spacing(lower[0], upper[0], n)
-    guess = np.empty(n)
-    for leaf in range(first.size):
-        if last[leaf] - first[leaf] != 1:
-            continue
-        spacing = np.inf
-        node = leaf
-        for _ in range(GUESS_LEVELS):
-            count = min(last[node] * BLOCK, n) - first[node] * BLOCK
-            if count > 1:  # one particle alone spans nothing
-                spacing = min(spacing, _spacing(lower[node], upper[node], count))
-            node = max(0, (node - 1) // 2)
-        guess[first[leaf] * BLOCK : last[leaf] * BLOCK] = ratio * max(spacing, least)
-    return guess

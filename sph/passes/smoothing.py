@@ -35,6 +35,7 @@ class FixedPasses(NamedTuple):
 
     count: int
     tolerance: float  # of the solution, relative
+    unsettled: float = UNSETTLED
 
     def find_support(self, kernel, dim, r, m, nc, mass, H, ratio, reach, largest):
         C = normalisation(kernel, dim)
@@ -58,7 +59,7 @@ class FixedPasses(NamedTuple):
                 Omega = -sum_dw / (D * sum_w)  # eq 8 with eqs 7 and 10: the D w terms cancel the 1
             rho = C * H_inv**D * sum_w  # eq 7
             H = min(ratio * (mass / rho) ** (1.0 / D), largest)  # eq 15
-        if abs(H * H_inv - 1.0) > UNSETTLED or not largest > H:
+        if abs(H * H_inv - 1.0) > self.unsettled or not largest > H:
             return solve(
                 kernel, dim, r, m, nc, mass, 1.0 / H_inv, ratio, reach, largest, self.tolerance
             )

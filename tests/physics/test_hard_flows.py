@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from sph.errors import NumericalError
-from sph.neighbours import search
+from sph.neighbours import first_guess
 from sph.problems import base
 
 SHIPPED = ["expanding_ball"]
@@ -129,8 +129,8 @@ def test_supports_of_random_particles_are_found_from_any_guess(run, monkeypatch,
     keys = ("problem.lattice='random'", "problem.dimension=3", "problem.n=1000")
     keys = ("uniform", *keys, "problem.velocity=0.0")
     found = run(*keys, max_steps=0).particles.by_id().support
-    guess = search.first_guess
-    monkeypatch.setattr(search, "first_guess", lambda *given: factor * guess(*given))
+    guess = first_guess.from_spacing
+    monkeypatch.setattr(first_guess, "from_spacing", lambda *given: factor * guess(*given))
     again = run(*keys, f"time.end={0.2 * (1 + factor)}", max_steps=0).particles.by_id().support
     # solved to 1e-10 either way, twice
     np.testing.assert_allclose(again, found, rtol=1e-9)

@@ -11,11 +11,13 @@ import pytest
 from sph import config as configuration
 from sph.clock import Clock
 from sph.errors import NumericalError
-from sph.neighbours import search
+from sph.neighbours import first_guess
+from sph.passes.smoothing import UNSETTLED
 from sph.problems import uniform
 from sph.problems.base import InitialState
 from sph.scene import Scene
 from sph.simulation import Simulation
+from sph.watchdog import Watchdog
 
 
 class Placed(uniform.Problem):
@@ -162,14 +164,64 @@ def test_masses_apart_by_a_million(begin, density, dimension):
     advance(simulation)
 
 
-@pytest.mark.parametrize("factor", [0.01, 3.0])
+@pytest.mark.parametrize("factor", [0.01, 3.0, 100.0])
 def test_random_particles_from_a_bad_first_guess(begin, monkeypatch, factor):
     places = np.random.default_rng(1).random((3, 2000))
     expected = begin(places, "periodic").particles.by_id()
-    guess = search.first_guess
-    monkeypatch.setattr(search, "first_guess", lambda *a: factor * guess(*a))
+    guess = first_guess.from_spacing
+    monkeypatch.setattr(first_guess, "from_spacing", lambda *a: factor * guess(*a))
     simulation = begin(places, "periodic")
     found = simulation.particles.by_id()
     np.testing.assert_allclose(found.support, expected.support, rtol=1e-9)  # 1e-10, solved
     np.testing.assert_allclose(found.density, expected.density, rtol=1e-9)
     assert simulation.list_builds < 20
+
+
+# --- each guard is what keeps its case from going wrong -----------------------------------------
+
+
+def test_without_trimming_a_wide_guess_lists_every_particle_for_every_block(begin, monkeypatch):
+    places = np.random.default_rng(1).random((2, 2000))
+    guess = first_guess.from_spacing
+    monkeypatch.setattr(first_guess, "from_spacing", lambda *a: 100.0 * guess(*a))
+
+    def listed():
+        return begin(places, "open").search.lists.count.mean()
+
+    # 30 particles to a support, up to eight times as many where it is left as it is
+    assert listed() < 2 * 8 * 30
+    monkeypatch.setattr(first_guess, "trim", lambda *a: None)
+    assert listed() > 0.9 * 2000  # but for those that are farther apart than the domain is wide
+
+
+@pytest.mark.parametrize("count", [1, 2])
+def test_without_a_largest_support_lonely_particles_end_the_run(begin, monkeypatch, count):
+    monkeypatch.setattr(Scene, "max_support", np.inf)
+    with pytest.raises(NumericalError, match="no support small enough for particle 1"):
+        begin(np.linspace(0.4, 0.6, count)[None], "open")
+
+
+def test_without_the_count_of_those_in_one_place_numbers_mean_nothing(begin, monkeypatch):
+    places = np.append(np.linspace(0.01, 0.99, 50), np.full(5, 0.505))[None]
+    monkeypatch.setattr(Simulation, "_check_found", lambda *_: None)
+    with pytest.raises(NumericalError, match="density of particle"):  # the watchdog's, no reason
+        begin(places, "open")
+    monkeypatch.setattr(Watchdog, "check", lambda *_: None)
+    assert begin(places, "open").particles.density.min() < 0.0
+
+
+def test_counted_passes_run_away_at_a_jump_of_mass_unless_it_is_solved_for(begin):
+    x = (np.arange(200) + 0.5) / 200
+    mass = np.where(x < 0.5, 1.0, 0.01) / 200
+
+    def farthest(unsettled):
+        simulation = begin(x[None], "periodic", mass)
+        models = simulation.scene.models
+        models = models._replace(smoothing=models.smoothing._replace(unsettled=unsettled))
+        solved = simulation.particles.support.copy()  # the start's are
+        for _ in range(20):  # nothing moves: a support that is found stays
+            simulation._density(models)
+        return np.max(np.abs(np.log(simulation.particles.support / solved)))
+
+    assert farthest(UNSETTLED) < UNSETTLED
+    assert farthest(np.inf) > 1.0  # a support six times too wide or narrow

@@ -8,9 +8,9 @@ import pytest
 
 from sph.domain import Domain
 from sph.errors import NumericalError
-from sph.neighbours import lists, order
+from sph.neighbours import first_guess, lists, order
 from sph.neighbours.order import BLOCK
-from sph.neighbours.search import GROWTH, Origin, Search, best_skin, first_guess
+from sph.neighbours.search import GROWTH, Origin, Search, best_skin
 from sph.threads import Team
 
 SHAPES = ["random", "clustered", "line", "plane", "equal_coordinates", "coincident"]
@@ -313,7 +313,7 @@ def test_first_guess_is_near_the_support_it_leads_to(shape, dimension):
     scene = dense.Scene(
         np.tile([-0.5, 0.5], (dimension, 1)), ("open",) * dimension, density_passes="converged"
     )
-    guess = first_guess(position, scene.h_ratio * scene.eta)
+    guess = first_guess.from_spacing(position, scene.h_ratio * scene.eta)
     gas = np.zeros_like(position), np.ones(count), np.ones(count)
     factor = guess / dense.rates(scene, position, *gas, guess).support
     # ten: Newton is there in some four steps, each bounded by a factor two
@@ -323,12 +323,45 @@ def test_first_guess_is_near_the_support_it_leads_to(shape, dimension):
 @pytest.mark.parametrize("count", [2, 3, 8, 9, 33])
 @pytest.mark.parametrize("shape", ["random", "line", "plane"])
 def test_first_guess_of_few_particles_is_finite_and_positive(shape, count):
-    guess = first_guess(positions(shape, 3, count), 2.5)
+    guess = first_guess.from_spacing(positions(shape, 3, count), 2.5)
     assert np.all(np.isfinite(guess) & (guess > 0))
 
 
 def test_first_guess_where_a_block_lies_in_one_place_is_positive():
     position = positions("random", 3, 100)
     position[:, : 2 * BLOCK] = 0.5
-    guess = first_guess(np.ascontiguousarray(position[:, ordered(position)]), 2.5)
+    guess = first_guess.from_spacing(np.ascontiguousarray(position[:, ordered(position)]), 2.5)
     assert np.all(np.isfinite(guess) & (guess > 0))
+
+
+def held(position, radius):
+    """Particles within `radius` (N,) of each one, by brute force."""
+    squared = ((position[:, :, None] - position[:, None, :]) ** 2).sum(axis=0)
+    return (squared < radius[:, None] ** 2).sum(axis=1)
+
+
+@pytest.mark.parametrize("dimension", [1, 2, 3])
+@pytest.mark.parametrize("factor", [0.1, 1.0, 100.0, 1e6])
+def test_a_guess_that_holds_far_too_many_is_trimmed_and_others_are_left(dimension, factor):
+    position = positions("random", dimension, 3000)
+    position = np.ascontiguousarray(position[:, ordered(position)])
+    ratio = 2.5  # spacings to a support
+    wanted = (2.0, np.pi, 4 / 3 * np.pi)[dimension - 1] * ratio**dimension
+    before = np.full(3000, factor * ratio * 3000 ** (-1 / dimension))
+    guess = before.copy()
+    first_guess.trim(position, ratio, 1e-9, guess)
+    if factor <= 1.0:
+        assert np.array_equal(guess, before)
+        return
+    # eight times as many at the most about the middle of a block; about a particle up to a block's
+    # extent away from it somewhat more
+    assert held(position, guess).max() < 2 * first_guess.TOO_MANY * wanted
+    assert held(position, before).min() > 2 * first_guess.TOO_MANY * wanted
+    # and it is halved no further than needed: twice it holds more, walls leave an eighth of a ball
+    assert held(position, 2 * guess).min() > first_guess.TOO_MANY * wanted / 8
+
+
+def test_trimming_ends_where_particles_are_in_one_place():
+    guess = np.ones(100)
+    first_guess.trim(np.full((3, 100), 0.5), 0.5, 1e-3, guess)
+    assert 1e-3 < guess.max() <= 2e-3

@@ -461,6 +461,81 @@ def test_what_a_restart_cannot_change_is_refused_before_anything_is(
     assert not (tmp_path / "new").exists()
 
 
+# a particle far from the others, whose support is held, and a liquid
+ALONE = """
+[problem]
+name = "particles"
+boundary = "open"
+domain = [0.0, 1.0]
+positions = [[0.1], [0.2], [0.3], [0.4], [0.5], [0.6], [0.7], [9.0]]
+masses = 0.125
+[physics]
+eta = 1.2
+[time]
+end = 0.1
+[output]
+interval = 0.025
+[run]
+threads = 1
+"""
+LIQUID = """
+[problem]
+name = "shock_tube"
+n = 60
+boundary = "mirror"
+left = { density = 1000.0, velocity = 0.0, pressure = 1e9 }
+right = { density = 1000.0, velocity = 0.0, pressure = 1e5 }
+[physics]
+eos = { name = "stiffened_gas", gamma = 4.4, p_inf = 1e9 }
+kernel = "wendland_c6"
+eta = 2.4
+[time]
+end = 1.2e-4
+[output]
+interval = 3e-5
+[run]
+threads = 1
+"""
+
+
+def test_particles_held_are_told_at_the_start_and_counted_in_every_step(tmp_path, tube):
+    watch = Watch()
+    run = start(ALONE, tmp_path / "run", watch)
+    said = (
+        "1 particle(s) have too few neighbours: their supports are held at 1 (physics.max_support)"
+    )
+    assert said in watch.notes
+    assert {row["held_supports"] for row in rows(run)} == {"1"}
+    assert "held_supports" not in rows(tube)[0]  # walls are near: nothing can be alone
+
+
+@pytest.mark.parametrize("text", [ALONE, LIQUID], ids=["held support", "stiffened gas"])
+def test_what_few_scenes_have_continues_bit_for_bit(tmp_path, text):
+    whole = start(text, tmp_path / "whole")
+    part = copy(whole, tmp_path / "part")
+    go_on(part.checkpoint_path(1))
+    assert_same_from(int(state(whole.checkpoint_path(1))["step"]), part, whole)
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "evolves"),
+    [("morris_monaghan", "cullen_dehnen", False), ("cullen_dehnen", "morris_monaghan", True)],
+)
+def test_a_restart_may_take_another_switch_of_viscosity(tmp_path, before, after, evolves):
+    def alpha(switch):
+        return f'physics.alpha={{ min = 0.1, max = 2.0, switch = "{switch}" }}'
+
+    run = RunDirectory.create(tmp_path / "run")
+    config = configuration.from_text(TUBE).override([alpha(before)])
+    runner.run(config, run, Watch())
+    assert ("alpha_rate" in state(run.checkpoint_path(4))) != evolves
+    go_on(run.checkpoint_path(2), alpha(after))
+    assert json.loads(run.summary.read_text())["status"] == "done"
+    last = state(run.checkpoint_path(4))
+    assert ("alpha_rate" in last) == evolves
+    assert 0.1 <= last["alpha"].min() < 0.3 < last["alpha"].max() <= 2.0  # off, and on in the shock
+
+
 # --- stops ------------------------------------------------------------------------------------
 
 
