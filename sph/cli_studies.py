@@ -99,7 +99,7 @@ def stress(only, directory, jobs):
               help="Set a key of the configuration; may be repeated.")  # fmt: skip
 @click.option("--limit", "limits", multiple=True, metavar="KEY=VALUE",
               help="What a stable run keeps and how it is looked for: reference, error_growth, "
-              "deviation, round_off, resolution; may be repeated.")  # fmt: skip
+              "deviation, negligible, resolution; may be repeated.")  # fmt: skip
 @click.option("-o", "directory", type=click.Path(path_type=Path), metavar="DIR",
               help="Where the runs go; runs/<name of CONFIG>-stability if not given.")  # fmt: skip
 @click.option("--jobs", type=click.IntRange(min=1), metavar="N",

@@ -29,8 +29,9 @@ class Criterion(NamedTuple):
     # Without an exact solution: L1 of the difference from the reference, particle by particle, as
     # a part of the field's mean size (of |v| + c_s for velocity).
     deviation: float = 0.05
-    # Errors below this part of the field's mean size are round-off, whatever the reference's are.
-    round_off: float = 1e-9
+    # With an exact solution: errors below this part of the field's mean size do not count, however
+    # small the reference's are. The default is round-off.
+    negligible: float = 1e-9
     # Factor between the last stable and the first unstable value at which bisection ends.
     resolution: float = 1.1
 
@@ -141,10 +142,11 @@ class Judge:
         sizes = _sizes(self.state)
         if not self.has_exact:
             return {name: self.criterion.deviation * size for name, size in sizes.items()}
-        growth, round_off = self.criterion.error_growth, self.criterion.round_off
+        growth, negligible = self.criterion.error_growth, self.criterion.negligible
         fields = self.summary["errors"]["fields"]
         return {
-            name: max(growth * norm["L1"], round_off * sizes[name]) for name, norm in fields.items()
+            name: max(growth * norm["L1"], negligible * sizes[name])
+            for name, norm in fields.items()
         }
 
     def _errors(self, summary: dict, directory: Path) -> dict[str, float]:
