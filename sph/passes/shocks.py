@@ -11,7 +11,7 @@ not shrink with it.)
 import numpy as np
 from numba import njit
 
-from sph.compiled import COMPILED
+from sph.compiled import COMPILED, larger, smaller
 from sph.kernels import dw_over_q, normalisation, w
 from sph.neighbours.lists import IMAGE_SHIFT
 from sph.neighbours.order import BLOCK
@@ -21,6 +21,8 @@ from sph.viscosity import alpha_after
 # A pivot below this part of the trace means that neighbours lie on a line or in a plane: there is
 # no gradient, and it counts as zero.
 SINGULAR = 1e-6
+
+TINY = 1e-300  # keeps 1/r finite where r_ij = 0 and what it multiplies is zero too
 
 
 @njit(**COMPILED, forceinline=True)
@@ -74,13 +76,16 @@ def shocks(
     v = np.empty((D, size))
     a = np.empty((D, size))
     m = np.empty(size)
-    c_s = np.empty(size)
+    c_half = np.empty(size)
     signed = np.empty(size)
+    q = np.empty(size)
+    weights = np.empty(size)
     # the same of the neighbours of one particle, as differences
+    near = np.empty(size, np.int64)
     r_ij = np.empty((D, size))
     v_ij = np.empty((D, size))
     a_ij = np.empty((D, size))
-    g = np.empty(size)
+    g_r = np.empty((D, size))  # g r_ij
     matrix = np.empty((D, D))
     inverse = np.empty((D, D))
     L = np.empty((D, D))
@@ -95,46 +100,52 @@ def shocks(
                 v[d, k] = sign[image, d] * velocity[d, j]
                 a[d, k] = sign[image, d] * acceleration[d, j]
             m[k] = weight(weighting, mass[j])
-            c_s[k] = sound_speed[j]
+            c_half[k] = 0.5 * sound_speed[j]
             signed[k] = m[k] * np.sign(div_v[j])
         for i in range(block * BLOCK, min((block + 1) * BLOCK, mass.size)):
             H_inv = 1.0 / support[i]
-            n = 0
+            c_half_i = 0.5 * sound_speed[i]
             signs = 0.0
-            fastest = sound_speed[i]
+            fastest = 0.0
             for k in range(nc):
-                squared = 0.0
-                for d in range(D):
-                    squared += (position[d, i] - x[d, k]) ** 2
-                q = np.sqrt(squared) * H_inv
-                if q >= 1.0:
-                    continue
+                squared = TINY
                 v_dot_r = 0.0
                 for d in range(D):
-                    r_ij[d, n] = (position[d, i] - x[d, k]) * H_inv
-                    v_ij[d, n] = velocity[d, i] - v[d, k]
-                    a_ij[d, n] = acceleration[d, i] - a[d, k]
-                    v_dot_r += v_ij[d, n] * r_ij[d, n]
-                g[n] = -m[k] * dw_over_q(kernel, dim, q)
-                signs += signed[k] * w(kernel, dim, q)
-                closing = min(v_dot_r, 0.0) / q if q > 0.0 else 0.0
-                fastest = max(fastest, 0.5 * (sound_speed[i] + c_s[k]) - closing)  # eq 15
-                n += 1
+                    r_d = position[d, i] - x[d, k]
+                    squared += r_d * r_d
+                    v_dot_r += (velocity[d, i] - v[d, k]) * r_d
+                r = np.sqrt(squared)
+                q[k] = r * H_inv
+                weights[k] = -m[k] * dw_over_q(kernel, dim, r * H_inv)
+                signs += signed[k] * w(kernel, dim, r * H_inv)
+                v_sig = c_half_i + c_half[k] - smaller(v_dot_r, 0.0) / r  # eq 15
+                fastest = larger(fastest, v_sig if r * H_inv < 1.0 else 0.0)
+            # a third of the candidates: worth a copy before the sums that follow
+            n = 0
+            for k in range(nc):
+                near[n] = k
+                n += q[k] < 1.0
+            for d in range(D):
+                for k in range(n):
+                    r_ij[d, k] = (position[d, i] - x[d, near[k]]) * H_inv
+                    g_r[d, k] = weights[near[k]] * r_ij[d, k]
+                    v_ij[d, k] = velocity[d, i] - v[d, near[k]]
+                    a_ij[d, k] = acceleration[d, i] - a[d, near[k]]
             signs *= mass_per_weight(weighting, mass[i]) * C * H_inv**D / density[i]  # eq 17
             for s in range(D):
-                for t in range(D):
+                for t in range(s, D):
                     total = 0.0
                     for k in range(n):
-                        total += g[k] * r_ij[s, k] * r_ij[t, k]
-                    matrix[s, t] = total
+                        total += r_ij[s, k] * g_r[t, k]
+                    matrix[s, t] = matrix[t, s] = total
             _invert(matrix, inverse)
             divergence_rate = 0.0
             for s in range(D):
                 for t in range(D):
                     total = total_a = 0.0
                     for k in range(n):
-                        total += g[k] * v_ij[s, k] * r_ij[t, k]
-                        total_a += g[k] * a_ij[s, k] * r_ij[t, k]
+                        total += v_ij[s, k] * g_r[t, k]
+                        total_a += a_ij[s, k] * g_r[t, k]
                     matrix[s, t] = total
                     divergence_rate += total_a * inverse[t, s] * H_inv
             divergence = 0.0
