@@ -12,7 +12,7 @@ from sph.particles import Particles
 from sph.passes import contacts, density, rates, shocks
 from sph.scene import Scene
 from sph.threads import Team
-from sph.watchdog import Watchdog, fault
+from sph.watchdog import Watchdog, crowded, fault
 
 # Each widening lists to at least the radius that was asked for, which grows by 2 at the most.
 MAX_WIDENINGS = 60
@@ -240,20 +240,7 @@ class Simulation:
         if models.max_support < np.inf:
             self.held_supports = int(np.count_nonzero(p.support == models.max_support))
         if p.density.min() < 0.0:
-            i = int(np.argmin(p.density))
-            here = p.position[:, i]
-            images = zip(*self.scene.domain.images, strict=True)
-            there = (s[:, None] * p.position + o[:, None] == here[:, None] for s, o in images)
-            others = sum(int(same.all(axis=0).sum()) for same in there) - 1
-            raise fault(
-                self,
-                f"there is no support small enough for particle {p.id[i]} at "
-                f"({', '.join(f'{x:.6g}' for x in here)}): {others} other(s) in the same "
-                "place, images at walls among them, outweigh what it is to hold",
-                'particles apart from each other, physics.density = "number" where one is much '
-                "heavier than its neighbour, or a larger physics.eta",
-                int(p.id[i]),
-            )
+            raise crowded(self)
 
     def _find_shocks(self, dt: float) -> None:
         """Alpha at the end of the step dt, from gradients of velocity and acceleration."""

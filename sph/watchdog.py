@@ -169,3 +169,27 @@ def fault(simulation, what: str, remedy: str, particle: int) -> NumericalError:
     return NumericalError(
         f"step {simulation.step}, t = {simulation.time:.6g}: {what}.\nTry: {remedy}.", particle
     )
+
+
+def crowded(simulation) -> NumericalError:
+    """The error to raise where a density below zero says that a particle has no support."""
+    p = simulation.particles
+    i = int(np.argmin(p.density))
+    here = p.position[:, i]
+    images = zip(*simulation.scene.domain.images, strict=True)
+    there = (s[:, None] * p.position + o[:, None] == here[:, None] for s, o in images)
+    others = sum(int(same.all(axis=0).sum()) for same in there) - 1
+    because = (
+        f"{others} other(s) in the same place, images at walls among them, outweigh"
+        if others
+        else "alone it outweighs"
+    )
+    where = ", ".join(f"{x:.6g}" for x in here)
+    return fault(
+        simulation,
+        f"there is no support small enough for particle {p.id[i]} at ({where}): "
+        f"{because} what it is to hold",
+        "a larger physics.eta, particles apart from each other, or physics.density = "
+        '"number" where one is much heavier than its neighbour',
+        int(p.id[i]),
+    )
