@@ -6,11 +6,8 @@ import numpy as np
 import pytest
 
 from sph import config as configuration
-from sph.clock import Clock
 from sph.external.point_mass import PointMass
 from sph.heating.relaxation import Relaxation
-from sph.scene import Scene
-from sph.simulation import Simulation
 
 BOX = """
 [problem]
@@ -28,21 +25,15 @@ interval = {end}
 
 
 @pytest.fixture
-def begin():
-    begun = []
-
+def begin(simulate):
     def start(overrides, dimension=1, n=32, velocity=0.0, domain="[0.0, 1.0]",
               boundary="periodic", end=1.0):  # fmt: skip
         text = BOX.format(dimension=dimension, n=n, velocity=[velocity] * dimension,
                           domain=domain, boundary=boundary, end=end)  # fmt: skip
         config = configuration.from_text(text).override(overrides)
-        begun.append(Simulation.start(Scene(config), 1, Clock()))
-        return begun[-1]
+        return simulate(config)
 
-    yield start
-    for simulation in begun:
-        simulation.close()
-        simulation.clock.close()
+    return start
 
 
 @pytest.mark.parametrize("softening", [0.0, 0.3])

@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 from sph import config as configuration
-from sph.clock import Clock
 from sph.errors import NumericalError
 from sph.neighbours import first_guess
 from sph.passes.smoothing import UNSETTLED
@@ -33,9 +32,8 @@ class Placed(uniform.Problem):
 
 
 @pytest.fixture
-def begin():
+def begin(simulate):
     """begin(positions (D, N), boundary, masses, **physics): a simulation in the unit box."""
-    begun = []
 
     def start(places, boundary, masses=None, **physics):
         dimension, n = np.shape(places)
@@ -54,13 +52,9 @@ def begin():
             problem=Placed(**settings),
             physics=configuration.Physics(**(config.physics.model_dump() | physics)),
         )
-        begun.append(Simulation.start(Scene(config), 1, Clock()))
-        return begun[-1]
+        return simulate(config)
 
-    yield start
-    for simulation in begun:
-        simulation.close()
-        simulation.clock.close()
+    return start
 
 
 def advance(simulation, steps=3):

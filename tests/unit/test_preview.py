@@ -7,9 +7,7 @@ import pytest
 
 from sph import config as configuration
 from sph import preview
-from sph.clock import Clock
 from sph.scene import Scene
-from sph.simulation import Simulation
 
 TUBE = """
 [problem]
@@ -26,11 +24,8 @@ threads = 1
 
 
 @pytest.fixture
-def simulation():
-    begun = Simulation.start(Scene(configuration.from_text(TUBE)), 1, Clock())
-    yield begun
-    begun.close()
-    begun.clock.close()
+def simulation(simulate):
+    return simulate(configuration.from_text(TUBE))
 
 
 def figure(text, pattern):

@@ -6,11 +6,8 @@ import numpy as np
 import pytest
 
 from sph import config as configuration
-from sph.clock import Clock
 from sph.errors import NumericalError
 from sph.output.checkpoint import state_hash
-from sph.scene import Scene
-from sph.simulation import Simulation
 from sph.threads import SMALLEST_RANGE, Team
 
 TUBE = """
@@ -36,19 +33,14 @@ interval = 0.02
 
 
 @pytest.fixture
-def begin():
+def begin(simulate):
     """begin(text, *overrides, threads=1): a simulation at t = 0, closed after the test."""
-    begun = []
 
     def start(text, *overrides, threads=1):
         config = configuration.from_text(text).override(overrides)
-        begun.append(Simulation.start(Scene(config), threads, Clock()))
-        return begun[-1]
+        return simulate(config, threads)
 
-    yield start
-    for simulation in begun:
-        simulation.close()
-        simulation.clock.close()
+    return start
 
 
 def fingerprint(simulation):

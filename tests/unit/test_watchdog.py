@@ -10,11 +10,8 @@ import pytest
 
 from sph import config as configuration
 from sph import watchdog
-from sph.clock import Clock
 from sph.errors import NumericalError
 from sph.integrators import leapfrog, step_size
-from sph.scene import Scene
-from sph.simulation import Simulation
 
 TUBE = """
 [problem]
@@ -29,18 +26,12 @@ interval = 0.2
 
 
 @pytest.fixture
-def begin():
-    begun = []
-
+def begin(simulate):
     def start(*overrides, text=TUBE, boundary="mirror"):
         config = configuration.from_text(text.format(boundary=boundary)).override(overrides)
-        begun.append(Simulation.start(Scene(config), 1, Clock()))
-        return begun[-1]
+        return simulate(config)
 
-    yield start
-    for simulation in begun:
-        simulation.close()
-        simulation.clock.close()
+    return start
 
 
 def run(simulation, until=0.2):
