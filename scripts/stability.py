@@ -2,7 +2,6 @@
 
     python scripts/stability.py [-o DIR] [--only sod --only noh …]     the searches, half an hour
     python scripts/stability.py [-o DIR] --table                       what is there, as Markdown
-    python scripts/stability.py [-o DIR] --pictures docs/images        how each scheme fails
 
 Stopped and called again, it goes on where it was: runs that are there are not repeated. Problems
 are small and short, so that a search takes seconds.
@@ -46,9 +45,6 @@ PROBLEMS = {
 # Where particles follow the exact solution to nearly nothing, half as much again is nothing either.
 LIMITS = {"contrast": ["negligible=1e-6"], "keplerian_ring": ["negligible=5e-3"]}
 IDEAL_GAS_ONLY = {"pressure_energy": ("stiffened_tube",)}
-
-# Values at which Sod's tube is drawn: stable, beyond and far beyond.
-SHOWN = {"physics.C": (0.25, 0.4, 0.6), "physics.eta": (1.2, 1.0, 0.85)}
 
 
 def combinations(only):
@@ -161,68 +157,14 @@ def _why(found: dict, end: dict) -> str:
     return ", ".join([*parts, *["energy"] * ("energy drifts" in end["reason"])])
 
 
-def pictures(directory: Path, target: Path) -> None:
-    """Density of Sod's tube in each scheme at SHOWN, with no limit on energy drift."""
-    from sph.analysis.figures import style
-
-    for key, values in SHOWN.items():
-        home = directory / f"sod-shown-{key}"
-        command = [
-            *(sys.executable, "-m", "sph.cli", "sweep", str(ROOT / "configs" / "sod.toml")),
-            *("--vary", f"physics.scheme={','.join(SCHEMES)}"),
-            *("--vary", f"{key}={','.join(map(str, values))}"),
-            *("--set", "problem.n=200", "--set", "physics.max_energy_drift=1e9"),
-            *("--jobs", "1", "--set", "run.threads=1", "-o", str(home)),
-        ]
-        subprocess.run(command, check=False)  # a run may fail: its panel says so
-        with style.paper():
-            picture = style.new_figure(9.0, 7.0)
-            panels = picture.subplots(len(SCHEMES), len(values), sharex=True, sharey=True)
-            for row, scheme in zip(panels, SCHEMES, strict=True):
-                row[0].set_ylabel(rf"$\rho$  ({scheme.replace('_', ' ')})")
-                for panel, value in zip(row, values, strict=True):
-                    _profile(panel, home / f"physics.scheme={scheme},{key}={value}")
-                    panel.set_title(f"{key} = {value}{panel.get_title()}", fontsize=10)
-            for panel in panels[-1]:
-                panel.set_xlabel("$x$")
-            # what has blown up goes off the panel rather than hide the rest
-            panels[0, 0].set_ylim(0.0, 1.5)
-            picture.savefig(target / f"stability_{key.partition('.')[2]}.png", dpi=100)
-
-
-def _profile(panel, directory: Path) -> None:
-    """The last density of a run, over the exact one; in the title its energy drift, or its end."""
-    import numpy as np
-
-    from sph.analysis.figures import style
-    from sph.output import checkpoint
-    from sph.output.run_directory import RunDirectory
-
-    run = RunDirectory(directory)
-    summary = json.loads(run.summary.read_text())
-    state = checkpoint.read(run.checkpoints()[-1])
-    x = state.particles.position[0]
-    order = np.argsort(x)
-    problem, eos = state.config.problem, state.config.physics.eos_model()
-    exact = problem.exact(eos, state.time, state.particles.position)["density"]
-    panel.plot(x[order], exact[order], color="0.6")
-    panel.plot(x, state.particles.density, ".", ms=2.5, color=style.PALETTE[0])
-    drift = summary["conservation"]["energy_drift_max"]
-    ended = "" if summary["status"] == "done" else f", stopped at t = {summary['time']:.2g}"
-    panel.set_title(f", drift {drift:.1g}{ended}")
-
-
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
     parser.add_argument("-o", dest="directory", type=Path, default=Path("runs/stability"))
     parser.add_argument("--only", action="append", choices=tuple(PROBLEMS), default=[])
     parser.add_argument("--table", action="store_true", help="print what is there")
-    parser.add_argument("--pictures", type=Path, metavar="FOLDER", help="draw into FOLDER")
     options = parser.parse_args()
     os.environ["PYTHONPATH"] = os.pathsep.join([str(ROOT), os.environ.get("PYTHONPATH", "")])
-    if options.pictures:
-        pictures(options.directory, options.pictures)
-    elif not options.table:
+    if not options.table:
         search(options.directory, options.only)
     print(table(options.directory, options.only))
 
