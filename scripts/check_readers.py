@@ -21,6 +21,8 @@ from sph.particles import Particles
 # Lattice cells along each axis, and the boundary, by dimension. In 1-D the gas is a line of the
 # smoothing length's width, so few cells: it must be wider than a pixel of the slice.
 CASES = {1: (100, "open"), 2: (40, "periodic"), 3: (16, "mirror")}
+# of the gas in one dimension, a liquid; those in two and three are ideal
+P_INF = {1: 0.1, 2: 0.0, 3: 0.0}
 # neither a cube nor beginning at 0
 DOMAIN = [[-0.5, 0.5], [0.25, 0.75], [-1.0, 1.0]]
 PARAMETERS = """
@@ -30,7 +32,7 @@ dimension = {dimension}
 domain = {domain}
 boundary = {boundary}
 [physics]
-gamma = 1.4
+eos = {eos}
 alpha = {{ min = 0.1, max = 2.0 }}
 """
 
@@ -44,9 +46,12 @@ def made_up(dimension: int) -> checkpoint.Checkpoint:
     number = position.shape[1]
     if boundary == "open":
         position[0, 0] -= 0.125  # one that has left the domain
+    p_inf = P_INF[dimension]
+    liquid = f'{{ name = "stiffened_gas", gamma = 1.4, p_inf = {p_inf} }}'
     settings = PARAMETERS.format(
-        dimension=dimension, domain=domain.tolist(), boundary=[boundary] * dimension
-    )
+        dimension=dimension, domain=domain.tolist(), boundary=[boundary] * dimension,
+        eos=liquid if p_inf else '{ name = "ideal_gas", gamma = 1.4 }',
+    )  # fmt: skip
     density = 1.0 + (position[0] - position[0].min())
     volume = np.prod(domain[:, 1] - domain[:, 0]) / number
     random = np.random.default_rng(dimension)
@@ -91,7 +96,7 @@ def expected(state: checkpoint.Checkpoint) -> dict[str, np.ndarray]:
         "density": gas.density,
         "internal energy": gas.internal_energy,
         "smoothing length": gas.support / ratio,
-        "pressure": (1.4 - 1) * gas.density * gas.internal_energy,
+        "pressure": (1.4 - 1) * gas.density * gas.internal_energy - 1.4 * P_INF[dimension],
         "id": gas.id,
         "position": None,  # compared by `same_positions`, for the box is the file's own
     }
