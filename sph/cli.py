@@ -124,7 +124,10 @@ def list_choices():
     from sph import registry
     from sph.stress.case import load as stress_cases
 
-    for package in ("problems", "kernels", "schemes", "eos", "viscosity.switches", "conductivity"):
+    for package in (
+        "problems", "kernels", "schemes", "eos", "viscosity.switches", "conductivity", "external",
+        "heating",
+    ):  # fmt: skip
         click.echo(f"{package}:")
         for name in registry.names(f"sph.{package}"):
             module = registry.load(f"sph.{package}", name)

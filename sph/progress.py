@@ -36,7 +36,7 @@ class Lines:
         if not simulated > begin:
             return ""
         left = (now - started) * (self.end - simulated) / (simulated - begin)
-        return f", about {left:.0f} s left"
+        return f", about {left:.0f} s left" if left < 1e9 else f", about {left:.1e} s left"
 
     def wrote(self, path, simulation):
         self.note(f"t = {simulation.time:.6g}: wrote {path.name}")

@@ -40,7 +40,7 @@ def restart(
         _note_damaged(home, path, progress)
     target, number = _place_to_go_on(home, path, directory)
     target.write_config(config.to_toml())
-    with stop_signals() as stopped_by, closing(Clock()) as clock:
+    with stop_signals() as stopped_by, closing(Clock()) as clock, np.errstate(all="ignore"):
         simulation = _resumed(config, checkpoint, clock)
         target.drop_checkpoints_after(number)
         for old in (target.summary, target.offenders):  # a run that is killed must not keep them

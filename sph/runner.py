@@ -33,7 +33,8 @@ def run(config: Config, directory: RunDirectory, progress) -> dict:
     `progress` has note(text), start(time, end), step(simulation), wrote(path, simulation) and
     close(). Raises NumericalError or Stopped, with what was reached kept in the directory.
     """
-    with stop_signals() as stopped_by, closing(Clock()) as clock:
+    # what is no number the watchdog finds, and names: NumPy's words would come before its own
+    with stop_signals() as stopped_by, closing(Clock()) as clock, np.errstate(all="ignore"):
         progress.note("preparing: the first run of a scene compiles its code, for up to a minute")
         simulation = Simulation.start(Scene(config), threads_of(config), clock)
         if simulation.held_supports:

@@ -83,6 +83,7 @@ class Simulation:
             alpha = float(scene.viscosity.start()) if scene.evolves_alpha else None
             particles = Particles.at_start(*initial, alpha=alpha)
         self = cls(scene, particles, threads, clock)
+        self.watchdog.check_range(self)
         self._keep_predictions()
         self._build_lists(dt=0.0, guess=True)
         self._density(scene.starting_models)

@@ -15,6 +15,16 @@ COLLAPSE = 1e-6
 # How far outside an open domain a particle may be, in lengths of the domain along that axis.
 FAR = 100.0
 
+# Windows to go beyond which a run is not going anywhere: more steps than a machine lasts for.
+MOST_WINDOWS = 1e12
+
+# Squares and cubes of what a run begins with, their sums and inverses have to be numbers too.
+LARGEST = 1e100
+
+NEARER_UNITS = (
+    "code units in which it is nearer to 1: outside 1e-100 to 1e100 its square and cube are no "
+    "numbers any more"
+)
 SMALLER_STEPS = "a smaller physics.C, a larger physics.alpha, physics.energy_limit = true"
 
 
@@ -33,8 +43,26 @@ class Watchdog:
             for lo, hi in [box[axis]]
         ]
         self._lowest_energy = getattr(scene.eos, "lowest_energy", None)
+        self._end = scene.config.time.end
         self._marked = None  # (time, step) at which the present window began
         self._longest = 0.0  # time covered by the best window
+
+    def check_range(self, simulation) -> None:
+        """Raise NumericalError, before anything is summed, where sums could not be numbers."""
+        box = simulation.scene.domain.box
+        for axis, length in zip("xyz", box[:, 1] - box[:, 0], strict=False):
+            if not 1.0 / LARGEST < length < LARGEST:
+                raise fault(simulation, f"the domain is {length:g} long in {axis}", NEARER_UNITS, 0)
+        p = simulation.particles
+        for name, values, smallest in (
+            ("mass", p.mass, 1.0 / LARGEST),
+            ("position", p.position, -LARGEST),
+            ("velocity", p.velocity, -LARGEST),
+            ("internal energy", p.internal_energy, 0.0),
+        ):
+            bad = ~((values >= smallest) & (values < LARGEST))
+            if bad.any():
+                raise _fault_of(simulation, name, values, bad, NEARER_UNITS)
 
     def check(self, simulation) -> None:
         """Raise NumericalError, which names a particle, where `simulation` cannot go on."""
@@ -60,16 +88,10 @@ class Watchdog:
         )
         for name, values, bad in tests:
             if bad.any():
-                i = int(np.argwhere(bad)[0][-1])
-                count = int(bad.any(axis=tuple(range(bad.ndim - 1))).sum())
-                where = ", ".join(f"{x:.6g}" for x in p.position[:, i])
-                raise fault(
-                    simulation,
-                    f"{name} of particle {p.id[i]} at ({where}) is {values[..., i]}; "
-                    f"{count} particle(s) are so",
-                    SMALLER_STEPS,
-                    int(p.id[i]),
-                )
+                remedy = SMALLER_STEPS if simulation.step else NEARER_UNITS
+                raise _fault_of(simulation, name, values, bad, remedy)
+        if not np.isfinite(sums).all():
+            raise _endless_sum(simulation)
         raise fault(
             simulation,
             f"the time step has shrunk to {dt:.3g}, which moves time on no more: "
@@ -147,6 +169,15 @@ class Watchdog:
                 "physics.alpha or more particles",
                 simulation.limit.particle,
             )
+        left = self._end - simulation.time
+        if covered * MOST_WINDOWS < left:
+            raise fault(
+                simulation,
+                f"the run will not come to its end: the last {WINDOW} steps covered {covered:.3g} "
+                f"of time, and {left:.3g} of it are left; {_what_sets(simulation.limit)}",
+                "a shorter time.end, or a setting that is not so far from its default",
+                simulation.limit.particle,
+            )
         self._longest = max(self._longest, covered)
         self._marked = simulation.time, simulation.step
 
@@ -168,6 +199,44 @@ def fault(simulation, what: str, remedy: str, particle: int) -> NumericalError:
     """The error to raise: what broke and when, what to try, and the ID of a particle (0: none)."""
     return NumericalError(
         f"step {simulation.step}, t = {simulation.time:.6g}: {what}.\nTry: {remedy}.", particle
+    )
+
+
+def _fault_of(simulation, name: str, values, bad, remedy: str) -> NumericalError:
+    """The error of the first particle whose `values` are `bad`, arrays (N,) or (D, N)."""
+    p = simulation.particles
+    i = int(np.argwhere(bad)[0][-1])
+    count = int(bad.any(axis=tuple(range(bad.ndim - 1))).sum())
+    where = ", ".join(f"{x:.6g}" for x in p.position[:, i])
+    return fault(
+        simulation,
+        f"{name} of particle {p.id[i]} at ({where}) is {values[..., i]}; "
+        f"{count} particle(s) are so",
+        remedy,
+        int(p.id[i]),
+    )
+
+
+def _endless_sum(simulation) -> NumericalError:
+    """The error to raise where what each particle has is a number, but not the sum of it."""
+    p, totals, external = simulation.particles, simulation.totals, simulation.scene.external
+    with np.errstate(all="ignore"):  # the very numbers that are looked for
+        if external is not None and not np.isfinite(totals.potential_energy):
+            name, each = "potential energy", external.potential(p.position)
+            remedy = "a softening of physics.external, or no particle where its mass is"
+        elif not np.isfinite(totals.kinetic_energy):
+            name, each, remedy = "kinetic energy", (p.velocity**2).sum(axis=0), SMALLER_STEPS
+        elif not np.isfinite(totals.internal_energy):
+            name, each, remedy = "internal energy", p.internal_energy, SMALLER_STEPS
+        else:
+            name, each, remedy = "rate of energy", p.energy_rate, SMALLER_STEPS
+        i = int(np.argmax(np.abs(each)))
+    where = ", ".join(f"{x:.6g}" for x in p.position[:, i])
+    return fault(
+        simulation,
+        f"the sum of all {name} is no number; the most is with particle {p.id[i]} at ({where})",
+        remedy,
+        int(p.id[i]),
     )
 
 

@@ -25,6 +25,8 @@ from sph.problems.base import Problem, Section
 # Of two keys for the same thing, the one the user gives leaves the other's default out.
 _IN_PLACE_OF = {"physics.eos": "gamma", "physics.gamma": "eos"}
 
+MOST_CHECKPOINTS = 100_000
+
 
 class Source(NamedTuple):
     """Raw tables, and where each key was given: a line, or an override's own text."""
@@ -146,6 +148,7 @@ def resolve(
             elsewhere = _tables_of_keys(models, besides=name)
             issues += explain(model, raw[name], details, name, elsewhere)
     issues += _gas_issues(found)
+    issues += _output_issues(found)
     if issues:
         raise ConfigError("\n".join(_reports(source, issues)))
     return found
@@ -252,6 +255,20 @@ def _gas_issues(found: dict[str, Section]) -> list[Issue]:
         return []
     text = f"= {value_text(physics.eos)}: expected an ideal gas for {found['problem'].name}"
     return [Issue(("physics", "eos"), text)]
+
+
+def _output_issues(found: dict[str, Section]) -> list[Issue]:
+    """More checkpoints than anyone can want: a disk is soon full of them."""
+    if not {"time", "output"} <= found.keys():
+        return []
+    end, interval = found["time"].end, found["output"].interval
+    if interval >= end / MOST_CHECKPOINTS:
+        return []
+    text = (
+        f"= {value_text(interval)}: expected at least {end / MOST_CHECKPOINTS:g}, for no more than "
+        f"{MOST_CHECKPOINTS} checkpoints until time.end"
+    )
+    return [Issue(("output", "interval"), text)]
 
 
 def _shape_issues(raw: dict[str, Any], problem: type[Problem]) -> list[Issue]:

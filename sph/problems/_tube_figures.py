@@ -94,6 +94,8 @@ def _shocks(tube: Tube, star: riemann.Star, speed: riemann.WaveSpeeds) -> dict[s
         if shock != tail or behind < (1.0 + FAINT) * ahead.density:
             continue
         order = order[tube.region[order]]
+        if not order.size:
+            continue
         x, above = tube.x[order], tube.density[order] - 0.5 * (ahead.density + behind)
         first = int(np.argmax(above > 0.0))
         if first == 0:  # none is so dense, or the region begins behind the shock

@@ -107,6 +107,10 @@ class Problem(base.Problem):
         if not self._domain_is_box():
             return self  # which the configuration says of every problem
         low, high = self.box[0]
+        if self.error_range and not (self.error_range[0] < high and low < self.error_range[1]):
+            raise ValueError(
+                f"error_range = {self.error_range} is outside the domain, [{low:g}, {high:g}]"
+            )
         if not low < self.discontinuity < high:
             raise ValueError(f"discontinuity = {self.discontinuity} is not inside [{low}, {high}]")
         self._sides()

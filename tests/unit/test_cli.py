@@ -8,6 +8,7 @@ import signal
 import subprocess
 import sys
 import tomllib
+import warnings
 from pathlib import Path
 
 import h5py
@@ -234,7 +235,9 @@ def test_list_names_every_choice():
     result = sph_("list")
     assert result.exit_code == 0
     sections = dict(re.findall(r"^(\w+):\n((?:  .*\n)+)", result.stdout, re.MULTILINE))
-    for section in ("problems", "kernels", "schemes", "eos"):
+    for section in (
+        "problems", "kernels", "schemes", "eos", "conductivity", "external", "heating",
+    ):  # fmt: skip
         named = [line.split()[0] for line in sections[section].splitlines()]
         assert named == registry.names(f"sph.{section}")
         assert all(len(line.split()) > 3 for line in sections[section].splitlines())
@@ -451,3 +454,11 @@ def test_a_killed_run_goes_on_from_its_last_good_checkpoint(config, tmp_path):
     assert hashes(run) == hashes(tmp_path / "whole")
     steps = [int(row.split(",")[0]) for row in (run / "history.csv").read_text().split()[1:]]
     assert steps == list(range(max(hashes(run)) + 1))
+
+
+def test_a_run_that_overflows_speaks_for_itself(config, tmp_path):
+    heating = 'physics.heating={ name = "relaxation", energy = 1e308, time = 1e-3 }'
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")  # NumPy's would be a second account of the same
+        result = sph_("run", config, "-o", tmp_path / "run", "--set", heating)
+    assert result.exit_code == 3, result.output

@@ -337,11 +337,22 @@ def test_report_of_the_exact_profile_finds_no_error_and_sees_one():
     assert wrong["plateau_right_pressure_error"] == pytest.approx(0.01, abs=1e-14)
 
 
+def test_figures_of_a_region_without_particles_are_left_out():
+    problem = ShockTube(error_range=[0.1, 0.1 + 1e-9])
+    position, velocity, mass, energy = problem.initial(AIR)
+    particles = SimpleNamespace(
+        position=position, velocity=velocity, mass=mass, internal_energy=energy,
+        density=np.ones(mass.size),
+    )  # fmt: skip
+    assert "shock_right_error" not in problem.report(AIR, 0.2, particles, np.ones(mass.size))
+
+
 @pytest.mark.parametrize(
     ("keys", "message"),
     [
         ({"discontinuity": 0.5}, "is not inside"),
         ({"error_range": [0.4, -0.4]}, "with lo below hi"),
+        ({"error_range": [10.0, 11.0]}, "is outside the domain"),
         ({"lattice": "bcc"}, 'take "cubic"'),
         ({"n": 3, "right": {"density": 1e-3, "pressure": 1.0}}, "takes 1000"),
         ({"left": {"density": 0.0, "pressure": 1.0}}, "greater than 0"),

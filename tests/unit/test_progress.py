@@ -183,3 +183,12 @@ def test_a_run_on_a_terminal_shows_a_bar_and_keeps_stdout_for_the_summary(tmp_pa
     assert "checkpoint" not in shown.decode()
     assert out.startswith("shock_tube: ")
     assert "%|" not in out
+
+
+def test_a_time_left_beyond_all_bounds_stays_short(clock, capsys):
+    lines = progress.Lines()
+    lines.start(0.0, 1e300)
+    lines.step(at(1.0))
+    clock.now += 20.0
+    lines.step(at(2.0))
+    assert capsys.readouterr().err.endswith("about 2.0e+301 s left\n")

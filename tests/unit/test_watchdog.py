@@ -220,3 +220,56 @@ def test_without_that_guard_the_liquid_is_a_number_that_is_none(begin, monkeypat
     monkeypatch.setattr(watchdog.Watchdog, "_check_gas", lambda self, simulation: None)
     with pytest.raises(NumericalError, match="acceleration"):
         begin(LIQUID, boundary="open")
+
+
+CLOUD = """
+[problem]
+name = "particles"
+boundary = "open"
+positions = [[-0.3], [0.0], [0.1], [0.3]]
+[time]
+end = 0.1
+"""
+
+
+@pytest.mark.parametrize(
+    ("override", "words"),
+    [
+        (
+            "problem.velocities=[[0.0],[1e155],[0.0],[0.0]]",
+            r"velocity of particle 2 .* \[1.e\+155\]",
+        ),
+        ("problem.masses=[1.0,1.0,1e-150,1.0]", "mass of particle 3 .* 1e-150"),
+        ("problem.internal_energies=1e300", "internal energy of particle 1"),
+        ("problem.positions=[[-0.3],[0.0],[0.1],[-1e200]]", "position of particle 4"),
+        ("problem.domain=[-1e200,1e200]", r"domain is 2e\+200 long in x"),
+        ("problem.domain=[-1e-200,1e-200]", "domain is 2e-200 long in x"),
+    ],
+)
+def test_what_no_sum_can_hold_is_named_before_the_first(begin, override, words):
+    with pytest.raises(NumericalError, match=words + r"[\s\S]*Try: code units"):
+        begin(override, text=CLOUD)
+
+
+def test_a_particle_on_an_unsoftened_mass_is_named(begin):
+    field = 'physics.external={name="point_mass",mass=1.0}'
+    with pytest.raises(NumericalError, match=r"potential energy .* particle 2 [\s\S]*softening"):
+        begin(field, text=CLOUD)
+    begin(field[:-1] + ",softening=0.1}", text=CLOUD)
+
+
+@pytest.mark.parametrize(
+    ("key", "words"), [("velocity", "kinetic"), ("internal_energy", "internal")]
+)
+def test_a_sum_beyond_numbers_is_told_from_a_step_too_small(begin, key, words):
+    simulation = begin()
+    getattr(simulation.particles, key)[..., 7] = 1e200 if key == "velocity" else 1.7e308
+    simulation.particles.mass[7] = 1e3
+    with np.errstate(all="ignore"), pytest.raises(NumericalError, match=f"all {words} energy"):
+        simulation._measure(past=None)
+
+
+def test_a_run_that_will_not_come_to_its_end(begin, monkeypatch):
+    monkeypatch.setattr(watchdog, "WINDOW", 20)
+    with pytest.raises(NumericalError, match="will not come to its end"):
+        run(begin("physics.C=1e-17"))

@@ -548,3 +548,10 @@ def test_files_that_cannot_be_read(tmp_path):
             config.load(path)
         assert str(caught.value).startswith(f"{path}: ")
         assert caught.value.exit_code == 4
+
+
+def test_more_checkpoints_than_anyone_can_want():
+    text = '[problem]\nname = "shock_tube"\n[time]\nend = 0.2\n[output]\ninterval = {}\n'
+    with pytest.raises(ConfigError, match=r"line 6: output.interval = .*: expected at least 2e-06"):
+        config.from_text(text.format("1.9e-6"))
+    assert config.from_text(text.format("2.1e-6")).output.interval == 2.1e-6
