@@ -6,7 +6,7 @@ from pathlib import Path
 import click
 
 from sph import cli_studies
-from sph.errors import SphError
+from sph.errors import ConfigError, SphError
 from sph.version import __version__
 
 OVERRIDES = click.option(
@@ -27,6 +27,9 @@ class Program(click.Group):
         except SphError as error:
             click.echo(f"sph: {error}", err=True)
             sys.exit(error.exit_code)
+        except MemoryError as error:
+            click.echo(f"sph: out of memory: {error}\nTry: a smaller problem.n.", err=True)
+            sys.exit(ConfigError.exit_code)
 
 
 @click.group(cls=Program, context_settings={"help_option_names": ["-h", "--help"]})

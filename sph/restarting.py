@@ -82,6 +82,16 @@ def _check_changes(config: Config, checkpoint: Checkpoint) -> None:
         for key in after
         if key not in before or after[key] != before[key]
     ]
+    now, then = config.physics, checkpoint.config.physics
+    for key, changed in (
+        ("external", now.external != then.external),
+        ("heating", (now.heating is None) != (then.heating is None)),
+    ):
+        if changed:
+            wrong.append(
+                f"physics.{key}: expected as in the checkpoint, for the run's energy is measured "
+                "by what it began with"
+            )
     if Scene(config).evolves_alpha != (checkpoint.particles.alpha is not None):
         kind = "one number" if checkpoint.particles.alpha is None else "a range"
         wrong.append(f"physics.alpha: expected {kind}, as in the checkpoint")

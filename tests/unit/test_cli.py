@@ -462,3 +462,25 @@ def test_a_run_that_overflows_speaks_for_itself(config, tmp_path):
         warnings.simplefilter("error")  # NumPy's would be a second account of the same
         result = sph_("run", config, "-o", tmp_path / "run", "--set", heating)
     assert result.exit_code == 3, result.output
+
+
+@pytest.mark.parametrize("key", ["external", "heating"])
+def test_what_a_run_measures_its_energy_by_stays(config, tmp_path, key):
+    run, parameters = tmp_path / "run", {"external": "mass", "heating": "energy"}
+    sph_("run", config, "-o", run, "--set", "time.end=0.001")
+    names = {"external": "point_mass", "heating": "relaxation, time = 1.0"}
+    name, _, rest = names[key].partition(",")
+    model = f'{{ name = "{name}", {parameters[key]} = 1.0{"," if rest else ""}{rest} }}'
+    result = sph_("restart", run, "--set", "time.end=0.002", "--set", f"physics.{key}={model}")
+    assert result.exit_code == 2
+    assert f"physics.{key}: expected as in the checkpoint" in result.stderr
+
+
+def test_too_many_particles_for_the_memory(config, tmp_path, monkeypatch):
+    def full(*_):
+        raise MemoryError("Unable to allocate 763. MiB")
+
+    monkeypatch.setattr("sph.simulation.Simulation.start", full)
+    result = sph_("run", config, "-o", tmp_path / "run")
+    assert result.exit_code == 2
+    assert "763. MiB\nTry: a smaller problem.n" in result.stderr
