@@ -33,3 +33,8 @@ class Stopped(SphError):
     """The run stopped early and left a checkpoint that can be restarted."""
 
     exit_code = 75
+
+
+def first_line(message: str) -> str:
+    """What a message says first, without its full stop."""
+    return message.partition("\n")[0].rstrip(".")

@@ -69,8 +69,10 @@ def _coming_step(config: Config, checkpoint: Checkpoint) -> float:
     now, before, p = config.physics, checkpoint.config.physics, checkpoint.particles
     step = checkpoint.next_step * (now.C / before.C)  # unchanged where C is: bit for bit
     if now.energy_limit and not before.energy_limit:
+        warm = p.internal_energy > 0.0  # as for every step: what has no energy sets none
         with np.errstate(divide="ignore"):
-            step = min(step, float(now.C * np.min(p.internal_energy / np.abs(p.energy_rate))))
+            times = p.internal_energy[warm] / np.abs(p.energy_rate[warm])
+        step = min(step, float(now.C * np.min(times, initial=np.inf)))
     return step
 
 
@@ -95,6 +97,11 @@ def _check_changes(config: Config, checkpoint: Checkpoint) -> None:
     if Scene(config).evolves_alpha != (checkpoint.particles.alpha is not None):
         kind = "one number" if checkpoint.particles.alpha is None else "a range"
         wrong.append(f"physics.alpha: expected {kind}, as in the checkpoint")
+    # energy is held against that at the start of the run, and the history's columns are given
+    if config.physics.external != checkpoint.config.physics.external:
+        wrong.append("physics.external cannot be changed in a restart: its energy is counted")
+    if config.physics.heating is not None and checkpoint.config.physics.heating is None:
+        wrong.append("physics.heating cannot begin in a restart: what it adds is counted")
     if config.time.end < checkpoint.time:
         wrong.append(
             f"time.end = {config.time.end}: expected a later time than the checkpoint's, "

@@ -1,6 +1,7 @@
 """The watchdog: whether the state of a simulation still means something, after every step.
 
-Its tests use sums that the history needs anyway; particles are only looked at once one fails.
+Its tests use sums that the history needs anyway; particles are only looked at once one fails,
+and where a sum would not tell: in open domains, and in gas that can be torn apart.
 """
 
 import numpy as np

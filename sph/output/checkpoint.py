@@ -56,6 +56,14 @@ class Checkpoint:
         """(N,) pressure of the corrected internal energy, as the scheme understands it."""
         return self.particles.pressure_by(self.config.physics.eos_model())
 
+    def field(self, name: str) -> np.ndarray:
+        """(N,) or (D, N) of the particles, pressure included."""
+        return self.pressure if name == "pressure" else getattr(self.particles, name)
+
+    def by_id(self, values: np.ndarray) -> np.ndarray:
+        """`values`, (N,) or (D, N), in the order of the particles' IDs."""
+        return values[..., np.argsort(self.particles.id)]
+
 
 def write(path: Path, checkpoint: Checkpoint) -> None:
     """Write `checkpoint` to `path`: the whole file or, after an error or a kill, none of it.

@@ -9,7 +9,7 @@ import numpy as np
 
 from sph.analysis.errors import FIELDS, norms
 from sph.config.errors import suggestion
-from sph.errors import ConfigError, NumericalError
+from sph.errors import ConfigError, NumericalError, first_line
 from sph.output import checkpoint as checkpoints
 from sph.output.checkpoint import Checkpoint
 from sph.output.run_directory import RunDirectory
@@ -155,12 +155,10 @@ class Judge:
             fields = (summary["errors"] or {}).get("fields", {})
             return {name: fields.get(name, {}).get("L1", NONE) for name in self.errors}
         state = _last(directory)
-        volume = _by_id(self.state, self.state.particles.mass / self.state.particles.density)
+        own = self.state
+        volume = own.by_id(own.particles.mass / own.particles.density)
         return {
-            name: norms(
-                _by_id(state, _field(state, name)) - _by_id(self.state, _field(self.state, name)),
-                volume,
-            )["L1"]
+            name: norms(state.by_id(state.field(name)) - own.by_id(own.field(name)), volume)["L1"]
             for name in self.errors
         }
 
@@ -168,10 +166,6 @@ class Judge:
 def read_summary(directory: Path) -> dict:
     """The summary of a run that has ended."""
     return json.loads(RunDirectory(directory).summary.read_text(encoding="utf-8"))
-
-
-def first_line(text: str) -> str:
-    return text.partition("\n")[0].rstrip(".")
 
 
 def _last(directory: Path) -> Checkpoint:
@@ -183,18 +177,9 @@ def _sizes(state: Checkpoint) -> dict[str, float]:
     p = state.particles
     volume = p.mass / p.density
     sound = state.config.physics.eos_model().sound_speed(p.density, state.pressure)
-    sizes = {name: _field(state, name) for name in FIELDS}
+    sizes = {name: state.field(name) for name in FIELDS}
     sizes["velocity"] = np.linalg.norm(p.velocity, axis=0) + sound
     return {name: norms(size, volume)["L1"] for name, size in sizes.items()}
-
-
-def _field(state: Checkpoint, name: str) -> np.ndarray:
-    """(N,) or (D, N)."""
-    return state.pressure if name == "pressure" else getattr(state.particles, name)
-
-
-def _by_id(state: Checkpoint, values: np.ndarray) -> np.ndarray:
-    return values[..., np.argsort(state.particles.id)]
 
 
 def _closeness(value: float) -> float:

@@ -9,8 +9,8 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from sph import config as configuration
-from sph.errors import FileError, NumericalError, Stopped
-from sph.stability.criterion import NONE, Criterion, Judge, Trial, first_line
+from sph.errors import FileError, NumericalError, Stopped, first_line
+from sph.stability.criterion import NONE, Criterion, Judge, Trial
 from sph.sweep import local
 from sph.sweep.manifest import SweepDirectory
 from sph.sweep.plan import Plan, Point

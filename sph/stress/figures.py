@@ -76,10 +76,10 @@ class Figures:
         return np.mean(values == kind) if values.dtype == object else OF_HISTORY[kind](values)
 
     def _of_state(self, field: str, kind: str):
-        return OF_STATE[kind](_length(_field(self._last, field)))
+        return OF_STATE[kind](_length(self._last.field(field)))
 
     def _change(self, field: str):
-        before, after = (_by_id(one, field) for one in (self._first, self._last))
+        before, after = (one.by_id(one.field(field)) for one in (self._first, self._last))
         size = np.abs(before) if before.ndim == 1 else _length(before).max()
         return (np.abs(_length(after - before)) / size).max()
 
@@ -89,18 +89,9 @@ class Figures:
         exact = problem.exact(eos, state.time, position)[field]
         inside, _ = problem.error_region(eos, state.time, position)
         with np.errstate(divide="ignore", invalid="ignore"):
-            difference = (_field(state, field) - exact) / np.abs(_length(exact))
+            difference = (state.field(field) - exact) / np.abs(_length(exact))
         volume = state.particles.mass / state.particles.density
         return norms(difference[..., inside], volume[inside])[norm]
-
-
-def _field(state: Checkpoint, name: str) -> np.ndarray:
-    """(N,) or (D, N) of the particles, pressure included."""
-    return state.pressure if name == "pressure" else getattr(state.particles, name)
-
-
-def _by_id(state: Checkpoint, name: str) -> np.ndarray:
-    return _field(state, name)[..., np.argsort(state.particles.id)]
 
 
 def _length(values: np.ndarray) -> np.ndarray:

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 from sph.analysis.report.runs import Row
 from sph.analysis.report.runs import read as read_runs
+from sph.errors import first_line
 from sph.stress.case import ALWAYS, Bound, Case, Failing
 from sph.stress.figures import NONE, Figures
 from sph.sweep.task import Task, standing
@@ -83,7 +84,7 @@ def judge(case: Case, setting: str, task: Task) -> Result:
 
 def _verdict(fails: Failing | None, checks: tuple[Check, ...], ended: str) -> tuple[str, str]:
     """The verdict and its reason; `ended`: why the run ended early, empty where it did not."""
-    found = _first_line(ended) or "; ".join(str(check) for check in checks if not check.holds)
+    found = first_line(ended) or "; ".join(str(check) for check in checks if not check.holds)
     if fails is None:
         return (SHORT, found) if found else (PASS, "")
     if not found:
@@ -111,7 +112,3 @@ def _numbers(row: Row | None, figures: Figures) -> dict:
         # the history of a run that failed ends before its last step, which may have compiled
         "cpu_seconds": max(0.0, row.cost["cpu"]),
     }
-
-
-def _first_line(text: str) -> str:
-    return text.partition("\n")[0].rstrip(".")

@@ -1,9 +1,10 @@
 """Every fault the watchdog looks for is found and named with a particle.
 
-Each test also shows what happens without its guard: the run goes on with what means nothing.
+Where a guard is taken away, the run goes on with what means nothing.
 """
 
 import math
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -63,6 +64,15 @@ def test_numbers_that_mean_nothing(begin, name, value, words):
     assert caught.value.particle == simulation.particles.id[7]
 
 
+def test_without_that_guard_they_go_unseen(begin, monkeypatch):
+    monkeypatch.setattr(watchdog.Watchdog, "_check_numbers", lambda *_: None)
+    simulation = begin()
+    simulation.particles.velocity[0, 7] = np.nan
+    for _ in range(2):
+        simulation.advance(math.inf)
+    assert np.isnan(simulation.totals.energy)
+
+
 def test_energy_that_comes_from_nowhere(begin, monkeypatch):
     """At four times the shipped step the tube gains energy, though every number is finite."""
     unstable = "physics.C=0.6", "physics.energy_limit=false"
@@ -76,6 +86,35 @@ def test_energy_that_comes_from_nowhere(begin, monkeypatch):
     assert abs(unwatched.totals.energy / before - 1) > 0.02  # a wrong answer, called done
 
 
+@pytest.mark.parametrize(
+    ("potential", "drift", "is_wrong"),
+    [
+        (0.0, 0.03, True),
+        (0.0, -0.03, True),
+        (0.0, 0.01, False),
+        # potential energy cancels the rest: a hundredth of that is still a hundredth
+        (-0.995, 0.01, False),
+        (-0.995, 0.03, True),
+        # gas bound deeply, with little energy of its own
+        (-100.0, 0.5, False),
+        (-100.0, -3.0, True),
+    ],
+)
+def test_energy_drift_is_of_the_larger_of_what_there_was_and_is(begin, potential, drift, is_wrong):
+    """Energies in units of the gas at rest; 0.02 of them may be lost or won."""
+    simulation = begin()
+    gas = simulation.totals.internal_energy
+    simulation.totals = simulation.totals._replace(potential_energy=potential * gas)
+    simulation.watchdog.energy_at_start = simulation.totals.energy - drift * gas
+    if not is_wrong:
+        simulation.watchdog.check(simulation)
+        return
+    with pytest.raises(NumericalError, match="total energy has changed by") as caught:
+        simulation.watchdog.check(simulation)
+    p = simulation.particles
+    assert caught.value.particle == p.id[np.argmax(p.internal_energy)]  # the masses are equal
+
+
 def test_energy_that_heating_adds_is_no_drift(begin):
     warm = begin('physics.heating={name="relaxation",energy=20.0,time=0.01}')
     before = warm.totals.energy
@@ -83,13 +122,32 @@ def test_energy_that_heating_adds_is_no_drift(begin):
     assert warm.totals.energy > 2 * before
 
 
-def test_a_particle_lost_from_an_open_domain(begin, monkeypatch):
-    simulation = begin(boundary="open")
-    simulation.particles.position[0, 3] = -102.0  # the domain is 1 long
-    with pytest.raises(NumericalError, match="is lost: its x = -102 ") as caught:
+SHEET = """
+[problem]
+name = "uniform"
+dimension = 2
+n = 64
+domain = [[0.0, 1.0], [-1.0, 1.0]]
+boundary = ["periodic", "open"]
+[time]
+end = 0.1
+[output]
+interval = 0.1
+"""
+
+
+@pytest.mark.parametrize(("inside", "outside"), [(-200.0, -202.0), (200.0, 202.0)])
+def test_a_particle_lost_from_an_open_domain(begin, monkeypatch, inside, outside):
+    """It is 2 wide along y, and ends 100 widths beyond; a periodic axis has no end."""
+    simulation = begin(text=SHEET)
+    p = simulation.particles
+    p.position[:, 3] = 500.0, inside
+    simulation.watchdog.check(simulation)
+    p.position[1, 3] = outside
+    with pytest.raises(NumericalError, match=f"is lost: its y = {outside:g} ") as caught:
         simulation.watchdog.check(simulation)
-    assert caught.value.particle == simulation.particles.id[3]
-    simulation.particles.position[0, 3] = -99.0
+    assert caught.value.particle == p.id[3]
+    monkeypatch.setattr(watchdog.Watchdog, "_check_fences", lambda *_: None)
     simulation.watchdog.check(simulation)
 
 
@@ -110,6 +168,25 @@ def test_a_step_that_collapses(begin, monkeypatch):
         run(simulation, math.inf)
     assert "physics.energy_limit = false" in str(caught.value)
     assert simulation.step < 25 + 41  # within two windows
+
+
+def after_windows(dog, *lengths):
+    """Show `dog` the ends of windows that covered these times."""
+    limit = step_size.StepLimit(dt=1e-3, particle=0, criterion="growth")
+    state = SimpleNamespace(time=0.0, step=0, limit=limit)
+    dog._check_pace(state)
+    for covered in lengths:
+        state.step += watchdog.WINDOW
+        state.time += covered
+        dog._check_pace(state)
+
+
+def test_a_pace_is_compared_with_the_best_there_was(begin):
+    scene = begin().scene
+    after_windows(watchdog.Watchdog(scene), 1e-9, 2e-9, 1e-9)  # slow from the start
+    after_windows(watchdog.Watchdog(scene), 1.0, 1e-3, 2e-6)
+    with pytest.raises(NumericalError, match=r"collapsed to 0\.001: it may not grow faster"):
+        after_windows(watchdog.Watchdog(scene), 1.0, 1e-4, 1e-8)
 
 
 def test_a_step_too_small_to_move_time(begin, monkeypatch):
@@ -195,7 +272,7 @@ def test_a_step_after_a_stiff_one_grows_by_its_factor(begin, monkeypatch):
     assert largest_growth() > 10
 
 
-def test_the_watchdog_costs_next_to_nothing_where_all_is_well(begin, monkeypatch):
+def test_the_watchdog_costs_next_to_nothing_where_all_is_well(begin):
     """It looks at no particle: with the arrays taken away it still says that all is well."""
     simulation = begin()
     particles = simulation.particles
