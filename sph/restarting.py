@@ -15,6 +15,7 @@ from sph.output import checkpoint as checkpoints
 from sph.output.checkpoint import Checkpoint
 from sph.output.files import copy_file
 from sph.output.history import History
+from sph.output.offenders import PART
 from sph.output.run_directory import RunDirectory, checkpoint_number, find
 from sph.runner import Runner, new_history, threads_of
 from sph.scene import Scene
@@ -33,6 +34,11 @@ def restart(
     """
     home, path = find(source)
     checkpoint = checkpoints.read(path)
+    if PART in checkpoint.lineage:
+        raise FileError(
+            f"{path} holds {PART}: there is no going on from it.\n"
+            "Try: the run's last good checkpoint, with other settings."
+        )
     config = checkpoint.config.override(overrides)
     _check_changes(config, checkpoint)
     reference.check(config, directory or (home and home.path))

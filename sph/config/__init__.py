@@ -139,7 +139,8 @@ class Physics(Section):
 
         scheme = registry.model_class("sph.schemes", self.scheme)
         if schemes.sums_pressure(scheme) and not eos.is_ideal(self.eos_model()):
-            problem = f'= "{self.scheme}": expected an ideal gas with it, not {self.eos}'
+            gas = value_text(self.eos)
+            problem = f'= "{self.scheme}": expected an ideal gas, not {gas}'
             raise as_error([Issue(("scheme",), problem)])
         return self
 

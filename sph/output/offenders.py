@@ -13,6 +13,9 @@ from sph.particles import Particles
 # Lines of the table: with the words around it, one screen.
 SHOWN = 8
 
+# Last in the lineage of such a file, which no run goes on from: the rest of the gas is missing.
+PART = "a particle that failed and its neighbours, alone"
+
 
 def leave(path: Path, state: Checkpoint, identity: int) -> str:
     """Write the particle of that ID and its neighbours to `path`; returns them in words.
@@ -64,7 +67,7 @@ def _part(state: Checkpoint, indices: np.ndarray) -> Checkpoint:
         list_support=state.list_support[indices],
         list_skin=state.list_skin,
         config=state.config,
-        lineage=state.lineage,
+        lineage=(*state.lineage, PART),
     )
 
 

@@ -438,7 +438,7 @@ def test_a_stop_while_compiling_and_a_restart_equal_a_run_without(config, tmp_pa
 
 
 def test_a_killed_run_goes_on_from_its_last_good_checkpoint(config, tmp_path):
-    process = started(tmp_path, "run", config, "-o", "run", "--set", "time.end=1e6")
+    process = started(tmp_path, "run", config, "-o", "run", "--set", "time.end=1e3")
     read_until(process.stderr, "wrote checkpoint_000002.h5")
     process.kill()
     finished(process)

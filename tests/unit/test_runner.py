@@ -628,6 +628,8 @@ def test_a_numerical_failure_names_the_particle_and_the_way_on(tmp_path, recwarn
     assert f"particle {offender}" in summary["reason"]
     assert len(rows(run)) == 1
     assert [str(warning.message) for warning in recwarn] == []
+    with pytest.raises(FileError, match=r"no going on from it\.\nTry: the run's last good"):
+        go_on(run.offenders, into=tmp_path / "part")
     go_on(run.checkpoint_path(0), "physics.C=0.15")
     assert json.loads(run.summary.read_text())["status"] == "done"
     assert not run.offenders.exists()
