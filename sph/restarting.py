@@ -103,11 +103,6 @@ def _check_changes(config: Config, checkpoint: Checkpoint) -> None:
     if Scene(config).evolves_alpha != (checkpoint.particles.alpha is not None):
         kind = "one number" if checkpoint.particles.alpha is None else "a range"
         wrong.append(f"physics.alpha: expected {kind}, as in the checkpoint")
-    # energy is held against that at the start of the run, and the history's columns are given
-    if config.physics.external != checkpoint.config.physics.external:
-        wrong.append("physics.external cannot be changed in a restart: its energy is counted")
-    if config.physics.heating is not None and checkpoint.config.physics.heating is None:
-        wrong.append("physics.heating cannot begin in a restart: what it adds is counted")
     if config.time.end < checkpoint.time:
         wrong.append(
             f"time.end = {config.time.end}: expected a later time than the checkpoint's, "
