@@ -46,7 +46,6 @@ def _neighbourhood(state: Checkpoint, i: int) -> tuple[np.ndarray, np.ndarray]:
     squared[i] = 0.0
     distance = np.sqrt(squared)
     near = distance < np.fmax(particles.support, particles.support[i])
-    near[i] = True
     indices = np.flatnonzero(near)
     indices = indices[np.lexsort((particles.id[indices], distance[indices]))]
     indices = np.concatenate([[i], indices[indices != i]])

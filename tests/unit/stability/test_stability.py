@@ -2,12 +2,16 @@
 
 import csv
 import json
+import shutil
 
+import numpy as np
 import pytest
 from click.testing import CliRunner
 
 from sph.cli import main
 from sph.errors import ConfigError
+from sph.output import checkpoint as checkpoints
+from sph.output.run_directory import RunDirectory
 from sph.stability import command, table
 from sph.stability.criterion import Criterion, Judge
 from sph.stability.search import Edge
@@ -178,6 +182,72 @@ def test_islands_of_stability_are_told(searched, tube):
     assert found.islands("largest") == more
     assert f"It is not one range: stable again at {more[0]:g}" in table.in_words(found)
     assert "WHICH IS BEYOND" in table.in_words(found)
+
+
+def changed(run, target, change):
+    """A copy of a run in `target`, its summary changed in place by `change`."""
+    shutil.copytree(run, target)
+    summary = RunDirectory(target).summary
+    content = json.loads(summary.read_text())
+    change(content)
+    summary.write_text(json.dumps(content))
+    return target
+
+
+def test_energy_drift_is_held_to_the_problem_or_to_the_reference(searched, tmp_path):
+    _, target = searched
+    reference, default = target / "physics.C=0.0375", target / "default"
+    judge = Judge(reference, Criterion())
+    allowed = judge.state.config.problem.limits["energy_drift"].bound
+    assert allowed != judge.state.config.physics.max_energy_drift  # else this shows nothing
+    assert judge.drift == allowed
+
+    def drifting(by):
+        return lambda summary: summary["conservation"].update(energy_drift_max=by)
+
+    trial = judge.trial(0.15, changed(default, tmp_path / "far", drifting(1.01 * allowed)))
+    assert trial.verdict == "beyond"
+    assert "energy drifts by" in trial.reason
+    near = changed(default, tmp_path / "near", drifting(0.99 * allowed))
+    assert judge.trial(0.15, near).verdict == "stable"
+    drifts = changed(reference, tmp_path / "reference", drifting(2.0 * allowed))
+    assert Judge(drifts, Criterion()).drift == pytest.approx(3.0 * allowed)
+
+
+def test_errors_below_a_part_of_the_field_do_not_count(searched, tmp_path):
+    """Against a reference without errors: of velocity, a part of the mean |v| + c_s."""
+    _, target = searched
+
+    def exact(summary):
+        for norms in summary["errors"]["fields"].values():
+            norms["L1"] = 0.0
+
+    judge = Judge(changed(target / "physics.C=0.0375", tmp_path / "exact", exact), Criterion())
+    p, gamma = judge.state.particles, 1.4
+    sizes = {
+        "density": p.density,
+        "velocity": np.abs(p.velocity[0]) + np.sqrt(gamma * (gamma - 1) * p.internal_energy),
+        "pressure": (gamma - 1) * p.density * p.internal_energy,
+        "internal_energy": p.internal_energy,
+    }
+    volume = p.mass / p.density
+    for name, size in sizes.items():
+        assert judge.errors[name] == pytest.approx(1e-9 * np.average(size, weights=volume)), name
+
+
+def test_particles_are_compared_by_their_ids(tmp_path):
+    """Runs that order them otherwise, as their lists ask, have no error by that."""
+    path = tmp_path / "four.toml"
+    path.write_text(
+        '[problem]\nname = "particles"\n[time]\nend = 0.05\n[output]\ninterval = 0.05\n'
+    )
+    judge = Trials(path, "physics.C", (), tmp_path / "out", Criterion(), 1).judge
+    turned = RunDirectory(changed(judge.directory, tmp_path / "turned", lambda summary: None))
+    state = checkpoints.read(turned.latest())
+    for array in state.particles.arrays().values():
+        array[...] = array[..., ::-1].copy()
+    checkpoints.write(turned.latest(), state)
+    assert judge.trial(0.0375, turned.path).error == 0.0
 
 
 def test_criterion_takes_what_is_set():
