@@ -95,7 +95,7 @@ class Judge:
     def trial(self, value: float, directory: Path) -> Trial:
         """The trial whose run, ended, is in `directory`. Raises FileError."""
         summary = read_summary(directory)
-        drift = summary["conservation"]["energy_drift_max"]
+        drift = float(summary["conservation"]["energy_drift_max"])  # "inf" is a word in JSON
         numbers = (drift, summary["steps"], _cpu(summary))
         if summary["status"] == "failed":
             reason = first_line(summary["reason"])
@@ -134,7 +134,7 @@ class Judge:
         """The problem's limit, or error_growth times what the reference does where that is more."""
         limit = self.state.config.problem.limits.get("energy_drift")
         bound = self.state.config.physics.max_energy_drift if limit is None else limit.bound
-        own = self.summary["conservation"]["energy_drift_max"]
+        own = float(self.summary["conservation"]["energy_drift_max"])
         return max(bound, self.criterion.error_growth * own)
 
     def _largest_errors(self) -> dict[str, float]:

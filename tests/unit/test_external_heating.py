@@ -107,6 +107,16 @@ def test_a_stiff_source_does_not_shorten_the_step(begin, tau):
     assert heated.energy_added == pytest.approx(gained, rel=1e-9)
 
 
+def test_the_rates_of_a_step_see_the_energy_that_it_ends_with(begin):
+    """Heating of both halves: with the first alone pressures would lag by half a step."""
+    heated = begin(['physics.heating={name="relaxation",energy=18.0,time=0.01}'])
+    u, dt = heated.particles.internal_energy[0], heated.limit.dt
+    heated.advance(math.inf)
+    expected = 18.0 + (u - 18.0) * math.exp(-dt / 0.01)
+    # two products of rounding; work between pairs of a uniform gas is as small
+    assert heated._energy == pytest.approx(expected, rel=1e-12)
+
+
 def test_a_scene_without_them_has_neither(begin):
     _inside, outside = begin([]).scene.parts()
     assert "external field: physics.external is not given" in outside

@@ -97,6 +97,9 @@ def test_a_pull_from_outside_bounds_the_step():
     assert step_size.limit(ALL, pulled, SIGNALS, None, None) == (
         pytest.approx(0.005, rel=1e-15), 5, "acceleration",
     )  # fmt: skip
+    aslant = particles(acceleration=np.array([[0.0, 1200.0], [0.0, 1600.0]]))
+    limit = step_size.limit(ALL, aslant, SIGNALS, None, None)
+    assert limit.dt == pytest.approx(0.005, rel=1e-15)
     without = ALL._replace(acceleration=False)
     assert step_size.limit(without, pulled, SIGNALS, None, None).criterion == "signal_speed"
 
@@ -117,6 +120,8 @@ def test_gas_that_parts_bounds_the_step():
     assert limit == (pytest.approx(0.004, rel=1e-15), 8, "support")
     past = Past(dt=0.01, limit=1.0, support=np.array([0.1, 0.4]))  # is not asked then
     assert step_size.limit(ALL, particles(), SIGNALS, parting, past) == limit
+    meeting = step_size.limit(ALL, particles(), SIGNALS, np.array([20.0, -100.0]), None)
+    assert meeting == (pytest.approx(0.004, rel=1e-15), 5, "support")
     slow = np.array([1.0, -2.0])
     assert step_size.limit(ALL, particles(), SIGNALS, slow, past).criterion == "signal_speed"
 
@@ -130,11 +135,31 @@ def test_a_step_grows_by_its_factor_at_most():
     past = Past(dt=1e-3, limit=1e-3, support=np.array([0.1, 0.2]))
     limit = step_size.limit(ALL, particles(), SIGNALS, None, past)
     assert limit == (pytest.approx(1.5e-3), 0, "growth")
+    twice = Past(dt=0.05, limit=0.05, support=np.array([0.1, 0.2]))  # 0.1 would be allowed
+    limit = step_size.limit(ALL, particles(), SIGNALS, None, twice)
+    assert limit == (pytest.approx(0.075), 0, "growth")
 
 
 def test_a_step_cut_to_land_on_an_output_does_not_shorten_the_next():
     past = Past(dt=1e-9, limit=0.1, support=np.array([0.1, 0.2]))
     assert step_size.limit(ALL, particles(), SIGNALS, None, past).dt == 0.1
+
+
+@pytest.mark.parametrize(
+    ("alike", "divergence", "past", "criterion"),
+    [
+        ({}, None, None, "signal_speed"),
+        ({"energy_rate": np.full(2, 10.0)}, None, None, "energy"),
+        ({"acceleration": np.full((1, 2), 2000.0)}, None, None, "acceleration"),
+        ({}, np.full(2, 100.0), None, "support"),
+        ({}, None, Past(dt=0.01, limit=1.0, support=np.full(2, 0.2)), "support"),
+    ],
+)
+def test_of_particles_alike_the_lower_id_sets_the_step(alike, divergence, past, criterion):
+    """Memory order must not show: it changes with the lists."""
+    both = particles(support=np.full(2, 0.1), **alike)
+    limit = step_size.limit(ALL, both, SIGNALS, divergence, past)
+    assert (limit.particle, limit.criterion) == (5, criterion)
 
 
 def test_gas_in_which_nothing_moves_takes_one_step():

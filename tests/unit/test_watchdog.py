@@ -44,6 +44,13 @@ def test_a_sound_run_is_left_alone(begin):
     run(begin())
 
 
+def test_a_step_cut_to_land_on_an_output_does_not_shorten_the_next(begin):
+    simulation = begin()
+    allowed = simulation.limit.dt
+    simulation.advance(1e-6 * allowed)
+    assert simulation.limit.dt > 0.9 * allowed  # nothing has moved
+
+
 @pytest.mark.parametrize(
     ("name", "value", "words"),
     [
