@@ -509,12 +509,40 @@ def test_particles_held_are_told_at_the_start_and_counted_in_every_step(tmp_path
     assert "held_supports" not in rows(tube)[0]  # walls are near: nothing can be alone
 
 
-@pytest.mark.parametrize("text", [ALONE, LIQUID], ids=["held support", "stiffened gas"])
+HEATED = TUBE + "[physics]\nheating = { name = 'relaxation', energy = 20.0, time = 0.1 }\n"
+
+
+@pytest.mark.parametrize(
+    "text", [ALONE, LIQUID, HEATED], ids=["held support", "stiffened gas", "heating"]
+)
 def test_what_few_scenes_have_continues_bit_for_bit(tmp_path, text):
     whole = start(text, tmp_path / "whole")
     part = copy(whole, tmp_path / "part")
     go_on(part.checkpoint_path(1))
     assert_same_from(int(state(whole.checkpoint_path(1))["step"]), part, whole)
+
+
+def rewritten(run, row, column, change):
+    """Change a value of the history by hand."""
+    with run.history.open(newline="") as file:
+        names, *lines = csv.reader(file)
+    place = names.index(column)
+    lines[row][place] = repr(change(float(lines[row][place])))
+    with run.history.open("w", newline="") as file:
+        csv.writer(file, lineterminator="\n").writerows([names, *lines])
+
+
+def test_a_restart_counts_energy_from_the_start_of_the_run(tube, tmp_path):
+    """Both are in the history alone: what the run began with, and what was injected until then."""
+    run = copy(tube, tmp_path / "injected")
+    step = int(state(run.checkpoint_path(2))["step"])
+    rewritten(run, step, "energy_injected", lambda _: 0.25)
+    go_on(run.checkpoint_path(2))
+    assert rows(run)[-1]["energy_injected"] == "0.25"  # this tube injects none
+    run = copy(tube, tmp_path / "more")
+    rewritten(run, 0, "total_energy", lambda energy: 1.5 * energy)
+    with pytest.raises(NumericalError, match=r"total energy has changed by -0\.333"):
+        go_on(run.checkpoint_path(2))
 
 
 @pytest.mark.parametrize(
