@@ -22,10 +22,10 @@ from sph import config as configuration
 from sph.analysis.figures import style
 from sph.output import checkpoint
 from sph.output.run_directory import RunDirectory
+from sph.stability.picture import SYMBOLS
 
 # Values at which Sod's tube is drawn: stable, beyond and far beyond.
 SHOWN = {"physics.C": (0.25, 0.4, 0.6), "physics.eta": (1.2, 1.0, 0.85)}
-SYMBOLS = {"physics.C": "$C$", "physics.eta": r"$\eta$"}
 COLUMNS = 5
 # Above this many times its limit a figure says no more than that a run blew up; stopped runs too.
 MOST = 30.0

@@ -1,7 +1,6 @@
 """Go on from a checkpoint: what may change, where it goes on, and that it does bit for bit."""
 
 from collections.abc import Sequence
-from contextlib import closing
 from pathlib import Path
 
 import numpy as np
@@ -17,10 +16,9 @@ from sph.output.files import copy_file
 from sph.output.history import History
 from sph.output.offenders import PART
 from sph.output.run_directory import RunDirectory, checkpoint_number, find
-from sph.runner import Runner, new_history, threads_of
+from sph.runner import Runner, new_history, session, threads_of
 from sph.scene import Scene
 from sph.simulation import Simulation
-from sph.stop_signals import stop_signals
 
 
 def restart(
@@ -45,8 +43,8 @@ def restart(
     if source.is_dir():
         _note_damaged(home, path, progress)
     target, number = _place_to_go_on(home, path, directory)
-    target.write_config(config.to_toml())
-    with stop_signals() as stopped_by, closing(Clock()) as clock, np.errstate(all="ignore"):
+    with session(target) as (stopped_by, clock):
+        target.write_config(config.to_toml())
         simulation = _resumed(config, checkpoint, clock)
         target.drop_checkpoints_after(number)
         for old in (target.summary, target.offenders):  # a run that is killed must not keep them

@@ -13,6 +13,7 @@ from sph.analysis import reference, summary
 from sph.clock import Clock
 from sph.config import Config
 from sph.errors import NumericalError, Stopped
+from sph.neighbours.search import Origin
 from sph.output import checkpoint as checkpoints
 from sph.output import offenders
 from sph.output.checkpoint import Checkpoint
@@ -31,12 +32,17 @@ def run(config: Config, directory: RunDirectory, progress) -> dict:
     """Run `config` from its initial state in an empty run directory; returns the summary.
 
     `progress` has note(text), start(time, end), step(simulation), wrote(path, simulation) and
-    close(). Raises NumericalError or Stopped, with what was reached kept in the directory.
+    close(). Raises NumericalError or Stopped, with what was reached kept in the directory, and
+    FileError.
     """
-    # what is no number the watchdog finds, and names: NumPy's words would come before its own
-    with stop_signals() as stopped_by, closing(Clock()) as clock, np.errstate(all="ignore"):
+    with session(directory) as (stopped_by, clock):
         progress.note("preparing: the first run of a scene compiles its code, for up to a minute")
-        simulation = Simulation.start(Scene(config), threads_of(config), clock)
+        simulation = Simulation.of_problem(Scene(config), threads_of(config), clock)
+        try:
+            simulation.begin()
+        except NumericalError as error:
+            directory.write_config(config.to_toml())
+            raise _failed_at_start(error, simulation, directory) from error
         if simulation.held_supports:
             progress.note(
                 f"{simulation.held_supports} particle(s) have too few neighbours: their supports "
@@ -46,6 +52,41 @@ def run(config: Config, directory: RunDirectory, progress) -> dict:
         history = new_history(config, simulation, directory)
         runner = Runner(config, directory, simulation, history, progress, stopped_by)
         return runner.from_start()
+
+
+@contextmanager
+def session(directory: RunDirectory) -> Iterator[tuple[list[str], Clock]]:
+    """What a run works in: alone in its directory, heeding signals (the list), by a clock."""
+    # what is no number the watchdog finds, and names: NumPy's words would come before its own
+    quiet = np.errstate(all="ignore")
+    with directory.alone(), stop_signals() as stopped_by, closing(Clock()) as clock, quiet:
+        yield stopped_by, clock
+
+
+def _failed_at_start(
+    error: NumericalError, simulation: Simulation, directory: RunDirectory
+) -> NumericalError:
+    """The error with the neighbourhood: there is no history yet, nor a checkpoint to go on from."""
+    simulation.close()
+    words = offenders.leave(directory.offenders, state_of(simulation), error.particle)
+    return NumericalError(f"{error}\n{words}".rstrip(), error.particle)
+
+
+def state_of(simulation: Simulation, lineage: tuple[str, ...] = ()) -> Checkpoint:
+    """What a checkpoint holds of a simulation, also of one that failed at its start."""
+    particles, limit = simulation.particles, simulation.limit
+    origin = simulation.search.origin or Origin(particles.position, particles.support, 0.0)
+    return Checkpoint(
+        particles=particles,
+        time=simulation.time,
+        step=simulation.step,
+        next_step=limit.dt if limit else 0.0,
+        list_position=origin.position,
+        list_support=origin.support,
+        list_skin=origin.skin,
+        config=simulation.scene.config,
+        lineage=lineage,
+    )
 
 
 def new_history(config: Config, simulation: Simulation, directory: RunDirectory) -> History:
@@ -213,18 +254,7 @@ class Runner:
         self.progress.wrote(path, simulation)
 
     def _checkpoint(self) -> Checkpoint:
-        simulation, origin = self.simulation, self.simulation.search.origin
-        return Checkpoint(
-            particles=simulation.particles,
-            time=simulation.time,
-            step=simulation.step,
-            next_step=simulation.limit.dt,
-            list_position=origin.position,
-            list_support=origin.support,
-            list_skin=origin.skin,
-            config=self.config,
-            lineage=self.lineage,
-        )
+        return state_of(self.simulation, self.lineage)
 
     def _close(self, status: str, reason: str | None = None) -> dict:
         self.history.flush()

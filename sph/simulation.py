@@ -77,19 +77,28 @@ class Simulation:
 
     @classmethod
     def start(cls, scene: Scene, threads: int, clock: Clock) -> "Simulation":
-        """From the problem's initial state: converged supports, rates, and the first step."""
+        """From the problem's initial state, ready for the first step. Raises NumericalError."""
+        self = cls.of_problem(scene, threads, clock)
+        self.begin()
+        return self
+
+    @classmethod
+    def of_problem(cls, scene: Scene, threads: int, clock: Clock) -> "Simulation":
+        """The problem's initial state, of which nothing has been computed yet."""
         with clock.phase("initial state"):
             initial = scene.config.problem.initial(scene.eos)
             alpha = float(scene.viscosity.start()) if scene.evolves_alpha else None
             particles = Particles.at_start(*initial, alpha=alpha)
-        self = cls(scene, particles, threads, clock)
+        return cls(scene, particles, threads, clock)
+
+    def begin(self) -> None:
+        """Converged supports, rates, and the first step. Raises NumericalError."""
         self.watchdog.check_range(self)
         self._keep_predictions()
         self._build_lists(dt=0.0, guess=True)
-        self._density(scene.starting_models)
-        self._rates(scene.starting_models)
+        self._density(self.scene.starting_models)
+        self._rates(self.scene.starting_models)
         self._measure(past=None)
-        return self
 
     @classmethod
     def resume(

@@ -54,6 +54,8 @@ class Watchdog:
         for axis, length in zip("xyz", box[:, 1] - box[:, 0], strict=False):
             if not 1.0 / LARGEST < length < LARGEST:
                 raise fault(simulation, f"the domain is {length:g} long in {axis}", NEARER_UNITS, 0)
+        if not 1.0 / LARGEST < self._end < LARGEST:
+            raise fault(simulation, f"time.end is {self._end:g}", NEARER_UNITS, 0)
         p = simulation.particles
         for name, values, smallest in (
             ("mass", p.mass, 1.0 / LARGEST),
@@ -130,12 +132,14 @@ class Watchdog:
         if abs(drift) > self.max_drift * scale:
             p = simulation.particles
             i = int(np.argmax(p.mass * (0.5 * (p.velocity**2).sum(axis=0) + p.internal_energy)))
+            pulled = simulation.scene.external is not None
             raise fault(
                 simulation,
                 f"total energy has changed by {drift / scale:.3g} of itself, more than "
                 f"physics.max_energy_drift = {self.max_drift:g}; the most is with particle "
                 f"{p.id[i]}",
-                f"{SMALLER_STEPS}, or a larger physics.max_energy_drift if that is good enough",
+                f"{SMALLER_STEPS}{', a softening of physics.external' * pulled}, or a larger "
+                "physics.max_energy_drift if that is good enough",
                 int(p.id[i]),
             )
 

@@ -80,6 +80,8 @@ def _table(particles: Particles, indices: np.ndarray, distance: np.ndarray) -> s
             np.linalg.norm(particles.acceleration[:, i]),
         )  # fmt: skip
         lines.append(f"{particles.id[i]:>11}" + "".join(f"{value:>11.3g}" for value in values))
+    if not particles.support[indices[0]] > 0.0:
+        return "\n".join([*lines, "Its neighbours are not known yet."]) + "\n"
     more = indices.size - SHOWN
     lines.append(f"and {more} more neighbours." if more > 0 else "These are all its neighbours.")
     return "\n".join(lines) + "\n"

@@ -1,19 +1,18 @@
 """The directory of a run: where everything is, and what may be replaced."""
 
-import json
-import math
+import fcntl
 import os
 import re
 import shutil
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-
-import numpy as np
 
 from sph.errors import FileError
 from sph.output import checkpoint
 from sph.output.files import explained, is_unfinished, remove_unfinished, write_text
+from sph.output.json_text import json_text
 
 CHECKPOINT_NAME = re.compile(r"checkpoint_(\d{6,})\.h5")
 
@@ -39,10 +38,17 @@ class RunDirectory:
         with explained(f"cannot write to {path}"):
             if run.path.exists() and not run.path.is_dir():
                 raise FileError(f"{path} is a file.\nTry: another directory, with -o.")
-            if run.path.is_dir() and not _holds_nothing(run.path):
-                run._make_room(force)
+            there = run.path.is_dir() and not _holds_nothing(run.path)
+            if there and not _is_run(run):
+                raise FileError(
+                    f"{path} is not a run directory, and it holds other things.\n"
+                    "Try: a new directory, with -o."
+                )
             run._checkpoint_directory.mkdir(parents=True, exist_ok=True)
-            run._remove_unfinished()
+            with run.alone():
+                if there:
+                    run._make_room(force)
+                run._remove_unfinished()
         return run
 
     @classmethod
@@ -122,16 +128,32 @@ class RunDirectory:
 
         Raises FileError, and TypeError for what has no place in JSON.
         """
-        text = json.dumps(_plain(summary), indent=2, ensure_ascii=False, allow_nan=False)
-        write_text(self.summary, text + "\n")
+        write_text(self.summary, json_text(summary))
+
+    @contextmanager
+    def alone(self) -> Iterator[None]:
+        """Hold the directory against other processes meanwhile. Raises FileError where one has it.
+
+        Where the file system knows no locks, nothing is held.
+        """
+        descriptor = os.open(self._checkpoint_directory, os.O_RDONLY)
+        try:
+            try:
+                fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except BlockingIOError:
+                raise FileError(
+                    f"{self.path} is in use: another sph is running there.\n"
+                    "Try: wait for its end, or another directory with -o."
+                ) from None
+            except OSError:
+                pass  # this file system has no locks
+            yield
+        finally:
+            os.close(descriptor)
 
     def _make_room(self, force: bool) -> None:
-        if not _is_run(self):
-            raise FileError(
-                f"{self.path} is not a run directory, and it holds other things.\n"
-                "Try: a new directory, with -o."
-            )
-        if not force:
+        begun = self.history.exists() or self.checkpoints()
+        if begun and not force:
             raise FileError(
                 f"{self.path} holds a run already.\nTry: --force to replace it, "
                 f"`sph restart {self.path}` to go on with it, or another directory with -o."
@@ -181,16 +203,3 @@ def _is_run(run: RunDirectory) -> bool:
 def _holds_nothing(directory: Path) -> bool:
     """No file but unfinished ones: empty, or what a run left that died before it began."""
     return all(is_unfinished(name) for _, _, files in os.walk(directory) for name in files)
-
-
-def _plain(value):
-    """`value` in JSON's own types."""
-    if isinstance(value, Mapping):
-        return {str(name): _plain(inner) for name, inner in value.items()}
-    if isinstance(value, np.ndarray | np.generic):
-        return _plain(value.tolist())
-    if isinstance(value, list | tuple):
-        return [_plain(inner) for inner in value]
-    if isinstance(value, float) and not math.isfinite(value):
-        return str(value)
-    return value

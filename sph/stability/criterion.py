@@ -95,7 +95,7 @@ class Judge:
     def trial(self, value: float, directory: Path) -> Trial:
         """The trial whose run, ended, is in `directory`. Raises FileError."""
         summary = read_summary(directory)
-        drift = float(summary["conservation"]["energy_drift_max"])  # "inf" is a word in JSON
+        drift = float(summary["conservation"]["energy_drift_max"])
         numbers = (drift, summary["steps"], _cpu(summary))
         if summary["status"] == "failed":
             reason = first_line(summary["reason"])
@@ -145,7 +145,7 @@ class Judge:
         growth, negligible = self.criterion.error_growth, self.criterion.negligible
         fields = self.summary["errors"]["fields"]
         return {
-            name: max(growth * norm["L1"], negligible * sizes[name])
+            name: max(growth * float(norm["L1"]), negligible * sizes[name])
             for name, norm in fields.items()
         }
 
@@ -153,7 +153,7 @@ class Judge:
         """L1 errors by field: against the exact solution, or else against the reference."""
         if self.has_exact:
             fields = (summary["errors"] or {}).get("fields", {})
-            return {name: fields.get(name, {}).get("L1", NONE) for name in self.errors}
+            return {name: float(fields.get(name, {}).get("L1", NONE)) for name in self.errors}
         state = _last(directory)
         own = self.state
         volume = own.by_id(own.particles.mass / own.particles.density)
@@ -164,7 +164,7 @@ class Judge:
 
 
 def read_summary(directory: Path) -> dict:
-    """The summary of a run that has ended."""
+    """The summary of a run that has ended; numbers that JSON has not are words for `float`."""
     return json.loads(RunDirectory(directory).summary.read_text(encoding="utf-8"))
 
 

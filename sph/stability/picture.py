@@ -11,6 +11,7 @@ from sph.analysis.figures import style
 from sph.output.files import replacing
 from sph.stability.command import Found
 
+# of the keys that are searched
 SYMBOLS = {"physics.C": "$C$", "physics.eta": r"$\eta$"}
 # verdict: marker, colour
 LOOKS = {

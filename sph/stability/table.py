@@ -2,12 +2,12 @@
 
 import csv
 import io
-import json
 import math
 from dataclasses import asdict
 from pathlib import Path
 
 from sph.output.files import explained, write_text
+from sph.output.json_text import json_text, null
 from sph.stability.command import Found
 
 # Of a run at the limit, below which it hardly tells: an instability needs some tens to be seen.
@@ -66,7 +66,7 @@ def as_json(found: Found) -> str:
             end: {
                 "stable": edge.inside,
                 "unstable": edge.outside,
-                "over_default": _plain(margin(found, end)),
+                "over_default": margin(found, end),
                 "reason": "" if edge.outside is None else found.at(edge.outside).reason,
                 "verdict": "" if edge.outside is None else found.at(edge.outside).verdict,
                 "stable_again_at": found.islands(end),
@@ -74,11 +74,9 @@ def as_json(found: Found) -> str:
             for end, edge in found.edges.items()
         },
         "words": in_words(found),
-        "trials": [
-            {name: _plain(value) for name, value in asdict(trial).items()} for trial in found.trials
-        ],
+        "trials": [asdict(trial) for trial in found.trials],
     }
-    return json.dumps(content, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+    return json_text(content, endless=null)
 
 
 def as_csv(found: Found) -> str:
@@ -125,7 +123,3 @@ def _ratio(found: Found, end: str) -> str:
     is_inside = ratio >= 1.0 if end == "largest" else ratio <= 1.0
     said = f"{ratio:.2g} times the configuration's {found.default:g}"
     return said if is_inside else f"{said}, WHICH IS BEYOND"
-
-
-def _plain(value):
-    return None if isinstance(value, float) and not math.isfinite(value) else value

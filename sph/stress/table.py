@@ -1,9 +1,9 @@
 """What came of the suite: a table and words for the terminal, Markdown and JSON."""
 
-import json
 import math
 from collections.abc import Sequence
 
+from sph.output.json_text import json_text, null
 from sph.stress.case import Case
 from sph.stress.verdict import PASS, Result
 
@@ -50,7 +50,7 @@ def as_json(cases: Sequence[Case], results: Sequence[Result]) -> str:
             for case in cases
         ],
     }
-    return json.dumps(content, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+    return json_text(content, endless=null)
 
 
 def sentences(cases: Sequence[Case], results: Sequence[Result]) -> list[str]:
@@ -136,11 +136,11 @@ def _record(case: Case, result: Result) -> dict:
         "set": case.settings[result.setting].set,
         "verdict": result.verdict,
         "reason": result.reason,
-        **{name: _plain(value) for name, value in result.numbers.items()},
+        **result.numbers,
         "checks": [
             {
                 "figure": check.figure,
-                "value": _plain(check.value),
+                "value": check.value,
                 "at_least": check.bound.at_least,
                 "at_most": check.bound.at_most,
                 "holds": check.holds,
@@ -149,12 +149,7 @@ def _record(case: Case, result: Result) -> dict:
             for check in result.checks
         ],
         "reaches": {
-            name: {"value": _plain(value), **case.reaches[name].model_dump()}
+            name: {"value": value, **case.reaches[name].model_dump()}
             for name, value in result.reaches.items()
         },
     }
-
-
-def _plain(value):
-    """`value`, or None for a number that JSON has not."""
-    return None if isinstance(value, float) and not math.isfinite(value) else value

@@ -697,14 +697,51 @@ def test_the_energy_limit_of_a_restart_leaves_gas_without_energy_aside(tmp_path)
     assert restarting._coming_step(limited, last) == pytest.approx(min(last.next_step, allowed))
 
 
-def test_a_failure_of_the_first_evaluation_names_no_checkpoint(tmp_path):
+def test_a_failure_of_the_first_evaluation_leaves_the_place_where_it_was(tmp_path):
     few = TUBE.replace("mirror", "periodic").replace("n = 60", "n = 18")
     few += "[physics]\neta = 30.0\n"
     run = RunDirectory.create(tmp_path / "run")
     with pytest.raises(NumericalError, match=r"particle .*support.*\nTry: ") as caught:
         runner.run(configuration.from_text(few), run, Watch())
-    assert "checkpoint" not in str(caught.value)
-    start(TUBE + "\n[physics]\nC = 0.3\n", tmp_path / "run")  # the place is free
+    assert "last good checkpoint" not in str(caught.value)
+    left = checkpoints.read(run.offenders)
+    assert left.particles.id[0] == caught.value.particle
+    assert left.config.problem == configuration.from_text(few).problem
+    with pytest.raises(FileError, match="it has no checkpoints"):
+        go_on(run.path)
+    # there was no run: nothing that would have to be replaced by force
+    start(TUBE + "\n[physics]\nC = 0.3\n", tmp_path / "run")
+    assert not run.offenders.exists()
+
+
+def test_a_failure_before_anything_is_computed_leaves_the_particle(tmp_path):
+    run = RunDirectory.create(tmp_path / "run")
+    huge = TUBE.replace("n = 60", "n = 60\nright = { density = 0.125, pressure = 1e150 }")
+    with pytest.raises(NumericalError, match="Its neighbours are not known yet") as caught:
+        runner.run(configuration.from_text(huge), run, Watch())
+    assert checkpoints.read(run.offenders).particles.id.tolist() == [caught.value.particle]
+
+
+def test_a_directory_in_which_a_run_is_under_way_is_left_alone(tmp_path, tube):
+    run, said = RunDirectory(tmp_path / "run"), []
+
+    def others(_):
+        before = files(run.path)
+        for again in (
+            lambda: start(TUBE, run.path),
+            lambda: RunDirectory.create(run.path, force=True),
+            lambda: runner.run(configuration.from_text(TUBE), run, Watch()),
+            lambda: go_on(run.path, "physics.C=0.01"),
+        ):
+            with pytest.raises(FileError, match=r"another sph is running there\.\nTry: ") as caught:
+                again()
+            said.append(str(caught.value))
+        assert files(run.path) == before
+
+    start(TUBE, run.path, Watch(at_step=others))
+    assert len(said) == 4 * (len(rows(run)) - 1)
+    assert differences(run.latest(), tube.latest()) == []
+    go_on(run.path, "time.end=0.21")  # free again
 
 
 # --- the summary ------------------------------------------------------------------------------

@@ -328,6 +328,7 @@ end = 0.1
         ("problem.positions=[[-0.3],[0.0],[0.1],[-1e200]]", "position of particle 4"),
         ("problem.domain=[-1e200,1e200]", r"domain is 2e\+200 long in x"),
         ("problem.domain=[-1e-200,1e-200]", "domain is 2e-200 long in x"),
+        ("time.end=1e-320", r"time\.end is 9\.99989e-321"),
     ],
 )
 def test_what_no_sum_can_hold_is_named_before_the_first(begin, override, words):
@@ -340,6 +341,16 @@ def test_a_particle_on_an_unsoftened_mass_is_named(begin):
     with pytest.raises(NumericalError, match=r"potential energy .* particle 2 [\s\S]*softening"):
         begin(field, text=CLOUD)
     begin(field[:-1] + ",softening=0.1}", text=CLOUD)
+
+
+@pytest.mark.parametrize("pulled", [False, True])
+def test_a_drift_under_an_external_field_may_be_cured_by_softening_it(begin, pulled):
+    field = ['physics.external={name="point_mass",mass=1.0,softening=0.1}'] * pulled
+    simulation = begin(*field, text=CLOUD)
+    simulation.particles.velocity[:] = 1.0
+    with pytest.raises(NumericalError, match="energy has changed") as caught:
+        simulation._measure(past=None)
+    assert ("softening" in str(caught.value)) == pulled
 
 
 @pytest.mark.parametrize(

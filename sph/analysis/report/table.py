@@ -2,11 +2,11 @@
 
 import csv
 import io
-import json
 from collections.abc import Sequence
 
 from sph.analysis.report.compare import COSTS, RESOLUTION, Report
 from sph.analysis.report.runs import Row
+from sph.output.json_text import json_text, null
 
 NORMS = ("L1", "L2", "Linf")
 
@@ -64,7 +64,7 @@ def as_json(report: Report, sentences: Sequence[str]) -> str:
         "series": series,
         "words": list(sentences),
     }
-    return json.dumps(content, indent=2, ensure_ascii=False) + "\n"
+    return json_text(content, endless=null)
 
 
 def _cells(report: Report) -> list[list[str]]:

@@ -1,3 +1,4 @@
+import errno
 import json
 import os
 
@@ -47,6 +48,26 @@ def test_empty_directory_and_what_died_before_it_began_are_taken(tmp_path):
     (tmp_path / ".config.toml.partial").touch()
     RunDirectory.create(tmp_path)
     assert tree(tmp_path) == set()
+
+
+def test_what_failed_before_its_first_checkpoint_is_taken_without_force(finished):
+    finished.offenders.touch()
+    for path in finished.checkpoints():
+        path.unlink()
+    with pytest.raises(FileError, match="--force"):  # its history would be lost
+        RunDirectory.create(finished.path)
+    finished.history.unlink(missing_ok=True)
+    RunDirectory.create(finished.path)
+    assert tree(finished.path) == {"config.toml"}
+
+
+def test_where_the_file_system_has_no_locks_runs_go_on_without(run, monkeypatch):
+    def refuse(*_):
+        raise OSError(errno.ENOLCK, "No locks available")
+
+    monkeypatch.setattr("fcntl.flock", refuse)
+    with run.alone(), run.alone():
+        pass
 
 
 def test_a_run_is_not_overwritten_without_force(finished):

@@ -98,6 +98,18 @@ def test_runs_that_are_there_are_not_repeated_and_judged_anew(searched, tube):
     assert judge.trial(0.0375, target / "physics.C=0.0375").verdict == "stable"
 
 
+@pytest.mark.parametrize("word", ["nan", "inf"])
+def test_an_error_that_is_no_number_is_beyond_the_limit(searched, tmp_path, word):
+    _, target = searched
+    run = shutil.copytree(target / "default", tmp_path / "default")
+    summary = json.loads((run / "summary.json").read_text())
+    summary["errors"]["fields"]["pressure"]["L1"] = word
+    (run / "summary.json").write_text(json.dumps(summary))
+    trial = Judge(target / "physics.C=0.0375", Criterion()).trial(0.15, run)
+    assert (trial.verdict, trial.field) == ("beyond", "pressure")
+    assert f"pressure is {word} of its limit" in trial.reason
+
+
 def test_a_killed_run_goes_on(searched, tube):
     _, target = searched
     run = target / "default"
