@@ -480,7 +480,7 @@ def test_too_many_particles_for_the_memory(config, tmp_path, monkeypatch):
     def full(*_):
         raise MemoryError("Unable to allocate 763. MiB")
 
-    monkeypatch.setattr("sph.simulation.Simulation.start", full)
+    monkeypatch.setattr("sph.simulation.Simulation.of_problem", full)
     result = sph_("run", config, "-o", tmp_path / "run")
     assert result.exit_code == 2
     assert "763. MiB\nTry: a smaller problem.n" in result.stderr
