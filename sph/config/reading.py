@@ -10,6 +10,7 @@ from pydantic import ValidationError
 from pydantic_core import ErrorDetails
 
 from sph import registry
+from sph.config import checks
 from sph.config.errors import (
     Issue,
     dotted,
@@ -24,8 +25,6 @@ from sph.problems.base import Problem, Section
 
 # Of two keys for the same thing, the one the user gives leaves the other's default out.
 _IN_PLACE_OF = {"physics.eos": "gamma", "physics.gamma": "eos"}
-
-MOST_CHECKPOINTS = 100_000
 
 
 class Source(NamedTuple):
@@ -129,12 +128,12 @@ def resolve(
         _set(source, override)
     models: dict[str, type[Section]] = {"problem": Problem, **sections}
     raw, issues = _known_tables(source.tables, models)
-    issues += _both_given(raw)
+    issues += checks.both_given(raw)
     problem = _problem_class(raw["problem"], issues)
     if problem is not None:
         models["problem"] = problem
         _fill_defaults(raw, problem)
-        issues += _shape_issues(raw["problem"], problem)
+        issues += checks.shape_issues(raw["problem"], problem)
     issues += not_finite(raw)
     found = {}
     for name, model in models.items():
@@ -147,8 +146,8 @@ def resolve(
             details = _details(error, problem is not None, bool(spoilt))
             elsewhere = _tables_of_keys(models, besides=name)
             issues += explain(model, raw[name], details, name, elsewhere)
-    issues += _gas_issues(found)
-    issues += _output_issues(found)
+    issues += checks.gas_issues(found)
+    issues += checks.output_issues(found)
     if issues:
         raise ConfigError("\n".join(_reports(source, issues)))
     return found
@@ -200,14 +199,6 @@ def _unknown_table(name: str, value: Any, models: dict[str, type[Section]]) -> I
     return Issue((name,), f"stands outside the tables; every key belongs in one of {tables}")
 
 
-def _both_given(raw: dict[str, dict[str, Any]]) -> list[Issue]:
-    """Two keys for the same thing: which of them the user means is not ours to guess."""
-    if {"eos", "gamma"} <= raw["physics"].keys():
-        text = "stands in place of physics.gamma: give one of the two"
-        return [Issue(("physics", "eos"), text)]
-    return []
-
-
 def _tables_of_keys(models: dict[str, type[Section]], besides: str = "") -> dict[str, str]:
     """The table of each key, but for one table's."""
     return {
@@ -239,66 +230,3 @@ def _fill_defaults(raw: dict[str, dict[str, Any]], problem: type[Problem]) -> No
     for name, field in problem.model_fields.items():  # a table in part keeps the rest of it
         if isinstance(field.default, Section) and isinstance(raw["problem"].get(name), dict):
             raw["problem"][name] = {**field.default.model_dump(), **raw["problem"][name]}
-
-
-# --- checks across keys -----------------------------------------------------------------------
-
-
-def _gas_issues(found: dict[str, Section]) -> list[Issue]:
-    """A problem that is solved for an ideal gas, with another one."""
-    if not {"problem", "physics"} <= found.keys() or not found["problem"].ideal_gas:
-        return []
-    from sph import eos
-
-    physics = found["physics"]
-    if eos.is_ideal(physics.eos_model()):
-        return []
-    text = f"= {value_text(physics.eos)}: expected an ideal gas for {found['problem'].name}"
-    return [Issue(("physics", "eos"), text)]
-
-
-def _output_issues(found: dict[str, Section]) -> list[Issue]:
-    """More checkpoints than anyone can want: a disk is soon full of them."""
-    if not {"time", "output"} <= found.keys():
-        return []
-    end, interval = found["time"].end, found["output"].interval
-    if interval >= end / MOST_CHECKPOINTS:
-        return []
-    text = (
-        f"= {value_text(interval)}: expected at least {end / MOST_CHECKPOINTS:g}, for no more than "
-        f"{MOST_CHECKPOINTS} checkpoints until time.end"
-    )
-    return [Issue(("output", "interval"), text)]
-
-
-def _shape_issues(raw: dict[str, Any], problem: type[Problem]) -> list[Issue]:
-    """The domain and the boundaries against the number of dimensions; types are checked later."""
-    known = {name: field.get_default() for name, field in problem.model_fields.items()} | raw
-    if known["dimension"] not in (1, 2, 3):
-        return []
-    found = []
-    if isinstance(known["domain"], list):
-        found += _domain_issues(known["domain"], known["dimension"])
-    if isinstance(known["boundary"], list):
-        found += _boundary_issues(known["boundary"], known["dimension"])
-    return found
-
-
-def _domain_issues(domain: list[Any], dimension: int) -> list[Issue]:
-    path = ("problem", "domain")
-    per_axis = any(isinstance(one, list) for one in domain)
-    axes = domain if per_axis else [domain] * dimension
-    if len(axes) != dimension or any(not isinstance(a, list) or len(a) != 2 for a in axes):
-        expected = "[lo, hi] for all axes" + (", or a list of one for each" * (dimension > 1))
-        return [Issue(path, f"= {value_text(domain)}: expected {expected} in {dimension}-D")]
-    numbers = all(type(end) in (int, float) for axis in axes for end in axis)
-    if numbers and any(low >= high for low, high in axes):
-        return [Issue(path, f"= {value_text(domain)}: expected lo below hi")]
-    return []
-
-
-def _boundary_issues(boundary: list[Any], dimension: int) -> list[Issue]:
-    if len(boundary) == dimension:
-        return []
-    expected = f"one for all axes, or a list of one for each in {dimension}-D"
-    return [Issue(("problem", "boundary"), f"= {value_text(boundary)}: expected {expected}")]

@@ -19,8 +19,8 @@ from typing import Any
 import tomli_w
 from pydantic import Field, ValidationError, model_validator
 
-from sph.config import SECTIONS
 from sph.config.errors import suggestion
+from sph.config.sections import SECTIONS
 from sph.errors import ConfigError, FileError
 from sph.problems.base import Section
 

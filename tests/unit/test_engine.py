@@ -13,6 +13,7 @@ import pytest
 
 from sph import config, kernels, passes, registry, schemes, simulation
 from sph.clock import Clock
+from sph.config.sections import AlphaRange
 from sph.domain import Domain
 from sph.eos import ideal_gas
 from sph.neighbours import order as ordering
@@ -415,9 +416,9 @@ def simulate(case, gas, end, threads=1):
     )
     alpha = case.alpha
     if case.evolves:
-        alpha = config.AlphaRange(**alpha)
+        alpha = AlphaRange(**alpha)
     if case.finds_shocks:
-        alpha = config.AlphaRange(**alpha, switch="cullen_dehnen")
+        alpha = AlphaRange(**alpha, switch="cullen_dehnen")
     name, strength = case.conductivity or (None, None)
     physics = config.Physics(
         gamma=1.4, alpha=alpha, eta=case.eta, density_passes=case.passes, scheme=case.scheme,
