@@ -2,9 +2,9 @@
 
     python scripts/stability_pictures.py [-o DIR] docs/images
 
-DIR is that of the searches, runs/stability if not given. Three pictures: every search of C and of
-eta; the gas of each problem at twice the largest stable C (grey: at that), and Sod's tube in each
-scheme, both of which are run here where that is missing.
+DIR is that of the searches, runs/stability if not given. Pictures: every search of C and of eta;
+the gas of each problem at twice the largest stable C (grey: at that); Sod's tube in each scheme.
+The runs of the last two are made here where they are missing.
 """
 
 import argparse
@@ -99,9 +99,9 @@ def gallery(directory: Path, target: Path) -> None:
         for run, colour, size in zip(runs, ("0.6", style.PALETTE[1]), (9, 3), strict=True):
             state = checkpoint.read(run.checkpoints()[last])
             _density(panel, state, AXES.get(problem), colour, size)
-        cost = json.loads(runs[1].summary.read_text())
-        drift = cost["conservation"]["energy_drift_max"]
-        ended = "" if cost["status"] == "done" else ", stopped"
+        summary = json.loads(runs[1].summary.read_text())
+        drift = float(summary["conservation"]["energy_drift_max"])
+        ended = "" if summary["status"] == "done" else ", stopped"
         panel.set_title(
             f"{problem.replace('_', ' ')}, C = {FAR * stable:.2g}\n"
             f"t = {state.time:.2g}, energy {drift:.0e}{ended}",
@@ -176,7 +176,7 @@ def _profile(panel, directory: Path) -> None:
     exact = problem.exact(eos, state.time, state.particles.position)["density"]
     panel.plot(x[order], exact[order], color="0.6")
     panel.plot(x, state.particles.density, ".", ms=2.5, color=style.PALETTE[0])
-    drift = summary["conservation"]["energy_drift_max"]
+    drift = float(summary["conservation"]["energy_drift_max"])
     ended = "" if summary["status"] == "done" else f", stopped at t = {summary['time']:.2g}"
     panel.set_title(f", drift {drift:.1g}{ended}")
 

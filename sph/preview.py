@@ -6,6 +6,7 @@ import numpy as np
 
 from sph.clock import Clock
 from sph.config import Config
+from sph.neighbours import BALL
 from sph.runner import output_times, threads_of
 from sph.scene import Scene
 from sph.simulation import Simulation
@@ -64,5 +65,4 @@ def bytes_held(simulation) -> int:
 def neighbours_per_particle(simulation) -> float:
     """Mean number of particles in a support, from its volume and the local density."""
     p, D = simulation.particles, simulation.scene.dimension
-    ball = (2.0, math.pi, 4 / 3 * math.pi)[D - 1]
-    return float(np.mean(ball * p.support**D * p.density / p.mass))
+    return float(np.mean(BALL[D - 1] * p.support**D * p.density / p.mass))

@@ -38,17 +38,16 @@ def run(config: Config, directory: RunDirectory, progress) -> dict:
     with session(directory) as (stopped_by, clock):
         progress.note("preparing: the first run of a scene compiles its code, for up to a minute")
         simulation = Simulation.of_problem(Scene(config), threads_of(config), clock)
+        directory.write_config(config.to_toml())
         try:
             simulation.begin()
         except NumericalError as error:
-            directory.write_config(config.to_toml())
             raise _failed_at_start(error, simulation, directory) from error
         if simulation.held_supports:
             progress.note(
                 f"{simulation.held_supports} particle(s) have too few neighbours: their supports "
                 f"are held at {simulation.scene.max_support:.4g} (physics.max_support)"
             )
-        directory.write_config(config.to_toml())
         history = new_history(config, simulation, directory)
         runner = Runner(config, directory, simulation, history, progress, stopped_by)
         return runner.from_start()

@@ -3,16 +3,16 @@
 import numpy as np
 from numba.core.registry import cpu_target
 
-from sph import passes, totals
+from sph import faults, passes, totals
 from sph.clock import Clock
 from sph.integrators import leapfrog, step_size
-from sph.neighbours.order import BLOCK, number_of_blocks
+from sph.neighbours.order import number_of_blocks
 from sph.neighbours.search import Origin, Search
 from sph.particles import Particles
 from sph.passes import contacts, density, rates, shocks
 from sph.scene import Scene
 from sph.threads import Team
-from sph.watchdog import Watchdog, crowded, fault
+from sph.watchdog import Watchdog
 
 # Each widening lists to at least the radius that was asked for, which grows by 2 at the most.
 MAX_WIDENINGS = 60
@@ -235,14 +235,7 @@ class Simulation:
             with self.clock.phase("lists"):
                 self._bring_inside()
                 self.search.widen(p.position, self._wanted, p.id)
-        block = int(np.argmax(self._wanted))
-        among = p.id[block * BLOCK : (block + 1) * BLOCK].tolist()
-        raise fault(
-            self,
-            f"no support holds enough neighbours for a particle among {among}",
-            "a closed domain (problem.boundary), or more particles",
-            among[0],
-        )
+        raise faults.starved(self, int(np.argmax(self._wanted)))
 
     def _check_found(self, models) -> None:
         """Count the supports that are held; raise where one has no root however small it is."""
@@ -250,7 +243,7 @@ class Simulation:
         if models.max_support < np.inf:
             self.held_supports = int(np.count_nonzero(p.support == models.max_support))
         if p.density.min() < 0.0:
-            raise crowded(self)
+            raise faults.crowded(self)
 
     def _find_shocks(self, dt: float) -> None:
         """Alpha at the end of the step dt, from gradients of velocity and acceleration."""

@@ -6,7 +6,7 @@ and where a sum would not tell: in open domains, and in gas that can be torn apa
 
 import numpy as np
 
-from sph.errors import NumericalError
+from sph.faults import SMALLER_STEPS, endless_sum, fault, fault_of, what_sets
 
 # Steps over which the advance of time is compared with that of the run's own past, and by how much
 # it may fall behind: cold gas meeting a shock may take some hundred steps of next to no length.
@@ -21,12 +21,10 @@ MOST_WINDOWS = 1e12
 
 # Squares and cubes of what a run begins with, their sums and inverses have to be numbers too.
 LARGEST = 1e100
-
 NEARER_UNITS = (
-    "code units in which it is nearer to 1: outside 1e-100 to 1e100 its square and cube are no "
-    "numbers any more"
+    f"code units in which it is nearer to 1: outside {1.0 / LARGEST:g} to {LARGEST:g} its square "
+    "and cube are no numbers any more"
 )
-SMALLER_STEPS = "a smaller physics.C, a larger physics.alpha, physics.energy_limit = true"
 
 
 class Watchdog:
@@ -65,7 +63,7 @@ class Watchdog:
         ):
             bad = ~((values >= smallest) & (values < LARGEST))
             if bad.any():
-                raise _fault_of(simulation, name, values, bad, NEARER_UNITS)
+                raise fault_of(simulation, name, values, bad, NEARER_UNITS)
 
     def check(self, simulation) -> None:
         """Raise NumericalError, which names a particle, where `simulation` cannot go on."""
@@ -92,13 +90,13 @@ class Watchdog:
         for name, values, bad in tests:
             if bad.any():
                 remedy = SMALLER_STEPS if simulation.step else NEARER_UNITS
-                raise _fault_of(simulation, name, values, bad, remedy)
+                raise fault_of(simulation, name, values, bad, remedy)
         if not np.isfinite(sums).all():
-            raise _endless_sum(simulation)
+            raise endless_sum(simulation)
         raise fault(
             simulation,
             f"the time step has shrunk to {dt:.3g}, which moves time on no more: "
-            f"{_what_sets(simulation.limit)}",
+            f"{what_sets(simulation.limit)}",
             SMALLER_STEPS,
             simulation.limit.particle,
         )
@@ -168,7 +166,7 @@ class Watchdog:
             raise fault(
                 simulation,
                 f"the time step has collapsed to {simulation.limit.dt:.3g}: "
-                f"{_what_sets(simulation.limit)}. The last {WINDOW} steps covered {covered:.3g} of "
+                f"{what_sets(simulation.limit)}. The last {WINDOW} steps covered {covered:.3g} of "
                 f"time, where {WINDOW} steps of this run have covered {self._longest:.3g}",
                 "physics.energy_limit = false where cold gas sets the step, else a larger "
                 "physics.alpha or more particles",
@@ -179,91 +177,9 @@ class Watchdog:
             raise fault(
                 simulation,
                 f"the run will not come to its end: the last {WINDOW} steps covered {covered:.3g} "
-                f"of time, and {left:.3g} of it are left; {_what_sets(simulation.limit)}",
+                f"of time, and {left:.3g} of it are left; {what_sets(simulation.limit)}",
                 "a shorter time.end, or a setting that is not so far from its default",
                 simulation.limit.particle,
             )
         self._longest = max(self._longest, covered)
         self._marked = simulation.time, simulation.step
-
-
-def _what_sets(limit) -> str:
-    """The particle and criterion of a step, in words."""
-    if not limit.particle:
-        return "it may not grow faster"
-    by = {
-        "signal_speed": "the speed of its signals",
-        "energy": "u/|du/dt|, how fast it is heated or cooled",
-        "acceleration": "its acceleration",
-        "support": "how fast its support changes",
-    }
-    return f"particle {limit.particle} sets it by {by[limit.criterion]}"
-
-
-def fault(simulation, what: str, remedy: str, particle: int) -> NumericalError:
-    """The error to raise: what broke and when, what to try, and the ID of a particle (0: none)."""
-    return NumericalError(
-        f"step {simulation.step}, t = {simulation.time:.6g}: {what}.\nTry: {remedy}.", particle
-    )
-
-
-def _fault_of(simulation, name: str, values, bad, remedy: str) -> NumericalError:
-    """The error of the first particle whose `values` are `bad`, arrays (N,) or (D, N)."""
-    p = simulation.particles
-    i = int(np.argwhere(bad)[0][-1])
-    count = int(bad.any(axis=tuple(range(bad.ndim - 1))).sum())
-    where = ", ".join(f"{x:.6g}" for x in p.position[:, i])
-    return fault(
-        simulation,
-        f"{name} of particle {p.id[i]} at ({where}) is {values[..., i]}; "
-        f"{count} particle(s) are so",
-        remedy,
-        int(p.id[i]),
-    )
-
-
-def _endless_sum(simulation) -> NumericalError:
-    """The error to raise where what each particle has is a number, but not the sum of it."""
-    p, totals, external = simulation.particles, simulation.totals, simulation.scene.external
-    with np.errstate(all="ignore"):  # the very numbers that are looked for
-        if external is not None and not np.isfinite(totals.potential_energy):
-            name, each = "potential energy", external.potential(p.position)
-            remedy = "a softening of physics.external, or no particle where its mass is"
-        elif not np.isfinite(totals.kinetic_energy):
-            name, each, remedy = "kinetic energy", (p.velocity**2).sum(axis=0), SMALLER_STEPS
-        elif not np.isfinite(totals.internal_energy):
-            name, each, remedy = "internal energy", p.internal_energy, SMALLER_STEPS
-        else:
-            name, each, remedy = "rate of energy", p.energy_rate, SMALLER_STEPS
-        i = int(np.argmax(np.abs(each)))
-    where = ", ".join(f"{x:.6g}" for x in p.position[:, i])
-    return fault(
-        simulation,
-        f"the sum of all {name} is no number; the most is with particle {p.id[i]} at ({where})",
-        remedy,
-        int(p.id[i]),
-    )
-
-
-def crowded(simulation) -> NumericalError:
-    """The error to raise where a density below zero says that a particle has no support."""
-    p = simulation.particles
-    i = int(np.argmin(p.density))
-    here = p.position[:, i]
-    images = zip(*simulation.scene.domain.images, strict=True)
-    there = (s[:, None] * p.position + o[:, None] == here[:, None] for s, o in images)
-    others = sum(int(same.all(axis=0).sum()) for same in there) - 1
-    because = (
-        f"{others} other(s) in the same place, images at walls among them, outweigh"
-        if others
-        else "alone it outweighs"
-    )
-    where = ", ".join(f"{x:.6g}" for x in here)
-    return fault(
-        simulation,
-        f"there is no support small enough for particle {p.id[i]} at ({where}): "
-        f"{because} what it is to hold",
-        "a larger physics.eta, particles apart from each other, or physics.density = "
-        '"number" where one is much heavier than its neighbour',
-        int(p.id[i]),
-    )

@@ -4,11 +4,17 @@ import numpy as np
 from numba import njit
 
 from sph.compiled import COMPILED
-from sph.neighbours import tree
+from sph.neighbours import BALL, tree
 from sph.neighbours.order import BLOCK
 
 # Levels of the tree, from the blocks upwards, at which the spacing is read: 8 to 64 particles.
 GUESS_LEVELS = 4
+
+# Where a guess holds so many times the particles that it is meant to hold, it is halved: lists of
+# them would fill the memory before the true support was found.
+TOO_MANY = 8.0
+
+HALVINGS = 60
 
 
 @njit(**COMPILED, forceinline=True)
@@ -24,7 +30,7 @@ def _spacing(lower, upper, n):
 
 @njit(**COMPILED)
 def from_spacing(position, ratio):
-    """Supports to begin the search of the true ones with, (N,), for positions in block order.
+    """Supports (N,) for positions (D, N) in block order.
 
     ratio = (H/h) eta times the least spacing of the boxes that hold the particle. (A box that cuts
     through planes of a lattice, or a gradient of density, shows too wide a spacing: supports that
@@ -49,23 +55,15 @@ def from_spacing(position, ratio):
     return guess
 
 
-# Where a guess holds so many times the particles that it is meant to hold, it is halved: lists of
-# them would fill the memory before the true support was found.
-TOO_MANY = 8.0
-
-HALVINGS = 60
-
-
 @njit(**COMPILED)
 def trim(position, ratio, least, guess):
-    """Halve the guesses (N,), for positions in block order, that hold far too many particles.
+    """Halve the guesses (N,) that hold far too many particles, for positions in block order.
 
     None goes below `least`. A support is meant to hold those of a ball of radius `ratio` spacings.
     """
     D, n = position.shape
     boxes = tree.build(position, guess)
-    volume = (2.0, np.pi, 4.0 * np.pi / 3.0)[D - 1]
-    most = TOO_MANY * volume * ratio**D
+    most = TOO_MANY * BALL[D - 1] * ratio**D
     centre = np.empty(D)
     for leaf in range(boxes.first.size):
         if boxes.last[leaf] - boxes.first[leaf] != 1:

@@ -136,7 +136,8 @@ class RunDirectory:
 
         Where the file system knows no locks, nothing is held.
         """
-        descriptor = os.open(self._checkpoint_directory, os.O_RDONLY)
+        with explained(f"cannot open {self.path}"):
+            descriptor = os.open(self._checkpoint_directory, os.O_RDONLY)
         try:
             try:
                 fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)

@@ -16,6 +16,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+TINY = 1e-300  # keeps 1/r finite where r_ij = 0 and what it multiplies is zero too
+
 
 class Models(NamedTuple):
     """What the formulas are made of; the types decide what is compiled, the values do not."""

@@ -11,8 +11,7 @@ from sph.conductivity import share
 from sph.kernels import dw_over_q, normalisation
 from sph.neighbours.lists import IMAGE_SHIFT
 from sph.neighbours.order import BLOCK
-
-TINY = 1e-300  # keeps 1/r finite where r_ij = 0 and what it multiplies is zero too
+from sph.passes import TINY
 
 
 @njit(**COMPILED)

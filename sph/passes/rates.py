@@ -9,11 +9,10 @@ from sph.eos import pressure
 from sph.kernels import force_over_q, normalisation
 from sph.neighbours.lists import IMAGE_SHIFT
 from sph.neighbours.order import BLOCK
+from sph.passes import TINY
 from sph.passes.weighting import by_share
 from sph.schemes import pair
 from sph.viscosity import pair_alpha
-
-TINY = 1e-300  # keeps 1/r finite where r_ij = 0 and the vector it multiplies is zero too
 
 
 @njit(**COMPILED)

@@ -15,14 +15,13 @@ from sph.compiled import COMPILED, larger, smaller
 from sph.kernels import dw_over_q, normalisation, w
 from sph.neighbours.lists import IMAGE_SHIFT
 from sph.neighbours.order import BLOCK
+from sph.passes import TINY
 from sph.passes.weighting import mass_per_weight, weight
 from sph.viscosity import alpha_after
 
 # A pivot below this part of the trace means that neighbours lie on a line or in a plane: there is
 # no gradient, and it counts as zero.
 SINGULAR = 1e-6
-
-TINY = 1e-300  # keeps 1/r finite where r_ij = 0 and what it multiplies is zero too
 
 
 @njit(**COMPILED, forceinline=True)

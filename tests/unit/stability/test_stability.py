@@ -2,7 +2,9 @@
 
 import csv
 import json
+import re
 import shutil
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -260,6 +262,14 @@ def test_particles_are_compared_by_their_ids(tmp_path):
         array[...] = array[..., ::-1].copy()
     checkpoints.write(turned.latest(), state)
     assert judge.trial(0.0375, turned.path).error == 0.0
+
+
+def test_help_and_document_tell_the_limits_there_are():
+    text = Path(__file__).parents[3].joinpath("docs/stability.md").read_text(encoding="utf-8")
+    told = dict(re.findall(r"^\| `(\w+)` \| ([\de.+-]+) \|", text, re.MULTILINE))
+    assert {name: float(value) for name, value in told.items()} == Criterion._field_defaults
+    said = CliRunner().invoke(main, ["stability", "--help"]).output
+    assert all(name in said for name in Criterion._fields)
 
 
 def test_criterion_takes_what_is_set():
