@@ -175,6 +175,11 @@ def test_a_step_that_collapses(begin, monkeypatch):
         run(simulation, math.inf)
     assert "physics.energy_limit = false" in str(caught.value)
     assert simulation.step < 25 + 41  # within two windows
+    monkeypatch.setattr(watchdog.Watchdog, "_check_pace", lambda *_: None)
+    time = simulation.time
+    for _ in range(100):
+        simulation.advance(math.inf)
+    assert simulation.time - time < 1e-6 * time  # it would be at it for ever
 
 
 def after_windows(dog, *lengths):
@@ -203,6 +208,11 @@ def test_a_step_too_small_to_move_time(begin, monkeypatch):
     monkeypatch.setattr(step_size, "limit", lambda *a: allowed(*a)._replace(dt=1e-30))
     with pytest.raises(NumericalError, match=r"shrunk to 1e-30.* sets it by the speed of its"):
         simulation.advance(math.inf)
+    monkeypatch.setattr(watchdog.Watchdog, "_check_numbers", lambda *_: None)
+    time = simulation.time
+    for _ in range(10):
+        simulation.advance(math.inf)
+    assert simulation.time == time  # for ever
 
 
 # Two cold streams part at Mach 10: the step of eq 32 takes most of what energy there is.
@@ -368,3 +378,14 @@ def test_a_run_that_will_not_come_to_its_end(begin, monkeypatch):
     monkeypatch.setattr(watchdog, "WINDOW", 20)
     with pytest.raises(NumericalError, match="will not come to its end"):
         run(begin("physics.C=1e-17"))
+    monkeypatch.setattr(watchdog.Watchdog, "_check_pace", lambda *_: None)
+    simulation = begin("physics.C=1e-17")
+    for _ in range(50):
+        simulation.advance(0.2)
+    assert 0.0 < simulation.time < 50 * 1e-17  # on its way to .2
+
+
+def test_without_a_look_at_the_range_words_are_of_what_is_not_wrong(begin, monkeypatch):
+    monkeypatch.setattr(watchdog.Watchdog, "check_range", lambda *_: None)
+    with pytest.raises(NumericalError, match="no support holds enough neighbours"):
+        begin("problem.velocities=[[0.0],[1e155],[0.0],[0.0]]", text=CLOUD)
