@@ -6,7 +6,7 @@ from pathlib import Path
 import click
 
 from sph import cli_studies
-from sph.errors import ConfigError, SphError
+from sph.errors import ConfigError, NumericalError, SphError
 from sph.version import __version__
 
 OVERRIDES = click.option(
@@ -15,6 +15,9 @@ OVERRIDES = click.option(
 )  # fmt: skip
 THREADS = click.option(
     "--threads", type=click.IntRange(min=1), metavar="N", help="Threads: run.threads for this run."
+)
+STRICT = click.option(
+    "--strict", is_flag=True, help="Exit with 3 where the run ends with a warning."
 )
 
 
@@ -46,7 +49,8 @@ def main():
 @THREADS
 @click.option("--dry-run", is_flag=True, help="Check CONFIG and say what the run would be.")
 @click.option("--force", is_flag=True, help="Replace an earlier run in DIR.")
-def run(config, overrides, directory, threads, dry_run, force):
+@STRICT
+def run(config, overrides, directory, threads, dry_run, force, strict):
     """Run CONFIG, a TOML file, from its initial state to its end."""
     from sph import config as configuration
 
@@ -61,13 +65,10 @@ def run(config, overrides, directory, threads, dry_run, force):
         click.echo(preview.describe(resolved))
         return
     from sph import progress, runner
-    from sph.analysis import summary
     from sph.output.run_directory import RunDirectory
 
     target = RunDirectory.create(where, force)
-    result = runner.run(resolved, target, progress.suited())
-    click.echo(summary.in_words(result))
-    click.echo(f"Results: {target.path} (`sph plot {target.path}` draws them).")
+    _tell(runner.run(resolved, target, progress.suited()), target, strict)
 
 
 @main.command()
@@ -76,18 +77,16 @@ def run(config, overrides, directory, threads, dry_run, force):
 @THREADS
 @click.option("-o", "directory", type=click.Path(path_type=Path), metavar="DIR",
               help="Go on in a new run directory; in the same one if not given.")  # fmt: skip
-def restart(source, overrides, threads, directory):
+@STRICT
+def restart(source, overrides, threads, directory, strict):
     """Go on from a run's last good checkpoint, or from that very checkpoint.
 
     In the same directory later checkpoints are replaced.
     """
     from sph import progress, restarting
-    from sph.analysis import summary
 
     overrides = _with_threads(overrides, threads)
-    result, target = restarting.restart(source, overrides, directory, progress.suited())
-    click.echo(summary.in_words(result))
-    click.echo(f"Results: {target.path} (`sph plot {target.path}` draws them).")
+    _tell(*restarting.restart(source, overrides, directory, progress.suited()), strict)
 
 
 @main.command()
@@ -138,6 +137,20 @@ def list_choices():
     click.echo("stress cases:")
     for case in stress_cases():
         click.echo(f"  {case.name:24s} {case.title}")
+
+
+def _tell(result, target, strict):
+    """The closing words on stdout; that there are warnings also on stderr, where logs are read."""
+    from sph import warnings
+    from sph.analysis import summary
+
+    click.echo(summary.in_words(result))
+    click.echo(f"Results: {target.path} (`sph plot {target.path}` draws them).")
+    if kinds := warnings.kinds(result):
+        said = f"{target.path} ended with warnings: {', '.join(kinds)} (see docs/warnings.md)"
+        if strict:
+            raise NumericalError(f"{said}.")
+        click.echo(f"sph: {said}.", err=True)
 
 
 def _with_threads(overrides, threads):

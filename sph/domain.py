@@ -36,6 +36,10 @@ class Domain:
     def largest_side(self) -> float:
         return float((self.box[:, 1] - self.box[:, 0]).max())
 
+    @property
+    def volume(self) -> float:
+        return float(np.prod(self.box[:, 1] - self.box[:, 0]))
+
     @cached_property
     def images(self) -> Images:
         """The identity and every image that can reach into the box from one box length away."""

@@ -98,6 +98,8 @@ def _of_the_scene(simulation: Simulation) -> dict[str, float]:
     scene, columns = simulation.scene, {}
     if scene.max_support < math.inf:
         columns["held_supports"] = simulation.held_supports
+    if scene.is_filled:
+        columns["volume_ratio"] = simulation.volume_ratio
     if scene.external is not None:
         columns["potential_energy"] = simulation.totals.potential_energy
     if scene.heating is not None:
@@ -164,7 +166,7 @@ class Runner:
         simulation.energy_injected = past["energy_injected"][-1]
         if "energy_added" in past:
             simulation.energy_added = past["energy_added"][-1]
-        simulation.watchdog.energy_at_start = past["total_energy"][0]
+        simulation.go_on_from(summary.baseline(past))
 
     @contextmanager
     def _closing(self):
@@ -195,7 +197,7 @@ class Runner:
     def _failed(self, error: NumericalError) -> NumericalError:
         """The error with what else a user needs: the neighbourhood, and where to go on from."""
         self._close("failed", reason=str(error))
-        last = self.directory.checkpoint_path(self.number - 1)
+        last = self.directory.last_good()
         words = offenders.leave(self.directory.offenders, self._checkpoint(), error.particle)
         return NumericalError(
             f"{error}\n{words}The last good checkpoint is {last}: "
@@ -224,8 +226,10 @@ class Runner:
             "limiter_particle": limit.particle,
             "limiter": limit.criterion,
             "kinetic_energy": totals.kinetic_energy,
+            "kinetic_energy_without_bulk": totals.kinetic_energy_without_bulk,
             "internal_energy": totals.internal_energy,
             "total_energy": totals.energy,
+            "energy_drift": simulation.energy_drift,
             "energy_injected": simulation.energy_injected,
             "min_density": totals.min_density,
             "max_density": totals.max_density,
@@ -269,5 +273,6 @@ class Runner:
             fine = reference.Reference(Path(named))
             where = str(self.directory.path)
             result["errors"] = reference.errors_against(self._checkpoint(), fine, where)
+            summary.warn(result, self.simulation)
             self.directory.write_summary(result)
         return result

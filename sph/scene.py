@@ -4,6 +4,8 @@ import math
 from dataclasses import dataclass
 from functools import cached_property
 
+import numpy as np
+
 from sph import kernels, schemes
 from sph.config import Config
 from sph.domain import Domain
@@ -69,6 +71,17 @@ class Scene:
     @property
     def sums_pressure(self) -> bool:
         return schemes.sums_pressure(self.models.scheme)
+
+    @cached_property
+    def keeps_momentum(self) -> np.ndarray:
+        """(D,) 1.0 for axes along which total momentum is conserved: no wall, no field."""
+        free = [kind != "mirror" and self.external is None for kind in self.domain.boundaries]
+        return np.array(free, dtype=float)
+
+    @property
+    def is_filled(self) -> bool:
+        """Whether gas fills a box without open sides, so that sum m/rho is to be its volume."""
+        return self.config.problem.fills_box and "open" not in self.domain.boundaries
 
     @property
     def max_support(self) -> float:

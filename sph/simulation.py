@@ -25,7 +25,8 @@ class Simulation:
     """Particles and the means to move them on.
 
     Attributes of use to others: particles, time, step (steps taken), limit (the coming step and
-    what sets it), totals, energy_added, energy_injected, scene, search.origin, clock, watchdog.
+    what sets it), totals, energy_drift, energy_added, energy_injected, scene, search.origin,
+    clock, watchdog.
     """
 
     def __init__(self, scene: Scene, particles: Particles, threads: int, clock: Clock):
@@ -44,6 +45,10 @@ class Simulation:
         self.held_supports = 0  # particles too lonely for a support within physics.max_support
         self.limit = None
         self.totals = None
+        self.baseline = (
+            None  # of the energy drift: set at the start, or for a restart by its caller
+        )
+        self.energy_drift = 0.0
         self.energy_added = 0.0  # by heating, since the run began
         self.energy_injected = 0.0  # to keep internal energies positive, since the run began
         self.watchdog = Watchdog(scene)
@@ -111,8 +116,14 @@ class Simulation:
         self.limit = step_size.StepLimit(next_step, 0, "checkpoint")
         with clock.phase("lists"):
             self.search.build(origin, particles.id)
-        self.totals = totals.of(particles, scene.external)
+        self.totals = totals.of(particles, scene.external, scene.keeps_momentum)
+        self.go_on_from(totals.Baseline.at(self.totals, 0.0))
         return self
+
+    def go_on_from(self, baseline: totals.Baseline) -> None:
+        """Measure the energy drift from `baseline`."""
+        self.baseline = baseline
+        self.energy_drift = baseline.drift(self.totals, self.energy_added)
 
     def advance(self, until: float) -> None:
         """One step (steps 1-9 of the seed), cut where it would pass `until`.
@@ -154,6 +165,11 @@ class Simulation:
         self.steps_here += 1
         self.time = until if landing else self.time + dt
         self._measure(step_size.Past(dt, allowed, self._support))
+
+    @property
+    def volume_ratio(self) -> float | None:
+        """Sum of m/rho over the volume of the box, None where gas does not fill a closed box."""
+        return self.totals.volume / self.scene.domain.volume if self.scene.is_filled else None
 
     def close(self) -> None:
         self.team.close()
@@ -290,7 +306,10 @@ class Simulation:
     def _measure(self, past: step_size.Past | None) -> None:
         """Step 8, the sums of the history, and whether the state means anything."""
         with self.clock.phase("step size, sums"):
-            self.totals = totals.of(self.particles, self.scene.external)
+            self.totals = totals.of(self.particles, self.scene.external, self.scene.keeps_momentum)
+            if self.baseline is None:
+                self.baseline = totals.Baseline.at(self.totals, self.energy_added)
+            self.energy_drift = self.baseline.drift(self.totals, self.energy_added)
             self.limit = step_size.limit(
                 self._bounds, self.particles, self._signal_speed, self._div_v, past
             )

@@ -12,9 +12,12 @@ class Totals(NamedTuple):
     """Of one state, in code units."""
 
     kinetic_energy: float
+    # the same of velocities relative to the mean one, along the axes that keep momentum
+    kinetic_energy_without_bulk: float
     internal_energy: float
     potential_energy: float  # in an external field, else 0
     momentum: np.ndarray  # (D,)
+    volume: float  # sum m/rho
     min_density: float
     max_density: float
     min_internal_energy: float
@@ -25,24 +28,70 @@ class Totals(NamedTuple):
     def energy(self) -> float:
         return self.kinetic_energy + self.internal_energy + self.potential_energy
 
+    @property
+    def energy_without_bulk(self) -> float:
+        """What an energy drift is measured by: bulk motion, however fast, would hide it."""
+        return self.kinetic_energy_without_bulk + self.internal_energy + self.potential_energy
 
-def of(particles, external) -> Totals:
-    """The totals of `particles`; external: a model of `sph.external`, or None."""
+
+class Baseline(NamedTuple):
+    """The energy that a run began with, without bulk motion, and what its drift is relative to."""
+
+    energy: float
+    scale: float
+
+    @classmethod
+    def of(cls, kinetic_without_bulk: float, internal: float, potential: float) -> "Baseline":
+        """From the sums at the start. Potential energy may cancel the others, which then scale."""
+        energy = kinetic_without_bulk + internal + potential
+        return cls(energy, max(abs(energy), kinetic_without_bulk + internal))
+
+    @classmethod
+    def at(cls, totals: Totals, added: float) -> "Baseline":
+        """As if a run began with these totals, after heating has added so much energy."""
+        return cls.of(
+            totals.kinetic_energy_without_bulk,
+            totals.internal_energy - added,
+            totals.potential_energy,
+        )
+
+    def drift(self, totals: Totals, added: float) -> float:
+        """Change of energy since the start, less what heating added, over the scale."""
+        change = totals.energy_without_bulk - added - self.energy
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return float(np.float64(change) / self.scale) if change else 0.0
+
+
+def of(particles, external, keeps_momentum) -> Totals:
+    """The totals of `particles`; external: a model of `sph.external`, or None.
+
+    keeps_momentum (D,): 1.0 for axes along which total momentum is conserved, 0.0 for others.
+    """
     p = particles
-    kinetic, internal, *others = _totals(
-        p.mass, p.velocity, p.internal_energy, p.density, p.acceleration, p.energy_rate
-    )
+    kinetic, relative, internal, *others = _totals(
+        p.mass, p.velocity, p.internal_energy, p.density, p.acceleration, p.energy_rate,
+        keeps_momentum,
+    )  # fmt: skip
     potential = 0.0 if external is None else float(p.mass @ external.potential(p.position))
-    return Totals(kinetic, internal, potential, *others)
+    return Totals(kinetic, relative, internal, potential, *others)
 
 
 @njit(**COMPILED)
-def _totals(mass, velocity, energy, density, acceleration, energy_rate):
+def _totals(mass, velocity, energy, density, acceleration, energy_rate, keeps_momentum):
     D, n = velocity.shape
     momentum = np.zeros(D)
-    kinetic = internal = rates = 0.0
+    kinetic = relative = internal = volume = rates = all_mass = 0.0
     lowest_density = lowest_energy = np.inf
     highest_density = highest_energy = -np.inf
+    for i in range(n):
+        all_mass += mass[i]
+        internal += mass[i] * energy[i]
+        volume += mass[i] / density[i]
+        rates += energy_rate[i]
+        lowest_energy = min(lowest_energy, energy[i])
+        highest_energy = max(highest_energy, energy[i])
+        lowest_density = min(lowest_density, density[i])
+        highest_density = max(highest_density, density[i])
     for d in range(D):
         along = squares = 0.0
         for i in range(n):
@@ -51,14 +100,13 @@ def _totals(mass, velocity, energy, density, acceleration, energy_rate):
             rates += acceleration[d, i]
         momentum[d] = along
         kinetic += 0.5 * squares
-    for i in range(n):
-        internal += mass[i] * energy[i]
-        rates += energy_rate[i]
-        lowest_energy = min(lowest_energy, energy[i])
-        highest_energy = max(highest_energy, energy[i])
-        lowest_density = min(lowest_density, density[i])
-        highest_density = max(highest_density, density[i])
+        # not a difference of two sums, of which nothing is left at a million times the sound speed
+        bulk = keeps_momentum[d] * along / all_mass
+        squares = 0.0
+        for i in range(n):
+            squares += mass[i] * (velocity[d, i] - bulk) ** 2
+        relative += 0.5 * squares
     return (
-        kinetic, internal, momentum, lowest_density, highest_density, lowest_energy,
-        highest_energy, rates,
+        kinetic, relative, internal, momentum, volume, lowest_density, highest_density,
+        lowest_energy, highest_energy, rates,
     )  # fmt: skip

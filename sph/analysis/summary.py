@@ -5,7 +5,9 @@ import sys
 
 import numpy as np
 
+from sph import warnings
 from sph.analysis import errors
+from sph.totals import Baseline
 from sph.version import __version__
 
 
@@ -22,6 +24,7 @@ def of_run(simulation, history: dict[str, np.ndarray], status: str, reason: str 
     result = {
         "status": status,
         "reason": reason,
+        "warnings": [],
         "version": __version__,
         "problem": problem.name,
         "dimension": scene.dimension,
@@ -30,7 +33,7 @@ def of_run(simulation, history: dict[str, np.ndarray], status: str, reason: str 
         "steps": simulation.step,
         "errors": None,
         "report": None,
-        "conservation": conservation(history, particles, eos, pressure, problem.boundaries),
+        "conservation": conservation(history, particles, scene),
         "cost": cost(simulation, history),
         "compiled_in": inside,
         "left_out": outside,
@@ -41,37 +44,64 @@ def of_run(simulation, history: dict[str, np.ndarray], status: str, reason: str 
             result["errors"] = exact
         report = problem.report(eos, simulation.time, particles, pressure)
         result["report"] = report | problem.over_time(eos, history)
+    warn(result, simulation)
     return result
 
 
-def conservation(history, particles, eos, pressure, boundaries) -> dict[str, float | None]:
-    """Drift of energy and momentum over the history.
+def warn(summary: dict, simulation) -> None:
+    """Set the warnings of a summary that is otherwise complete."""
+    found = warnings.of_run(simulation, summary)
+    summary["warnings"] = [one._asdict() for one in found]
 
-    energy_drift: (E - E_0)/|E_0| at the end, where E leaves out what heating added, and
-    energy_drift_max its largest modulus at any step; energy_injected: what keeping internal
-    energies positive cost, a part of the drift and as it relative to |E_0|, or to the kinetic and
-    internal energy at the start where that is more;
-    momentum_change: |P - P_0| over sum m (|v| + c_s) of the last state, the largest of the axes
-    without walls, which take momentum up; None where there is no such axis.
+
+def conservation(history, particles, scene) -> dict[str, float | None]:
+    """What was kept over the whole history.
+
+    energy_drift: (E - E_0)/|E_0| at the end, and energy_drift_max its largest modulus at any step,
+    as `sph.totals.Baseline` has it: without the energy of bulk motion and without what heating
+    added; energy_injected: what keeping internal energies positive cost, a part of the drift and
+    relative to the same;
+    momentum_change: the largest |P - P_0| at any step over sum m (|v - v_bulk| + c_s) of the last
+    state, of the axes that keep momentum, None where there is none (walls, a field);
+    volume_ratio: sum m/rho over the volume of the box at the end, and volume_ratio_worst that
+    farthest from 1 at any step; None where gas does not fill a closed box.
     """
-    energy = history["total_energy"] - history.get("energy_added", 0.0)
-    # potential energy may cancel the others, which are then what an error is measured by
-    scale_of_energy = max(
-        abs(energy[0]), history["kinetic_energy"][0] + history["internal_energy"][0]
-    )
-    drift = (energy - energy[0]) / scale_of_energy
-    with np.errstate(invalid="ignore"):  # the last state of a run that failed
-        sound_speed = eos.sound_speed(particles.density, pressure)
-        speed = np.linalg.norm(particles.velocity, axis=0)
-        scale = float(np.sum(particles.mass * (speed + sound_speed)))
-    axes = (axis for axis, kind in zip("xyz", boundaries, strict=False) if kind != "mirror")
-    momentum = [history[f"momentum_{axis}"] for axis in axes]
+    drift = history["energy_drift"]
+    ratio = history.get("volume_ratio")
     return {
         "energy_drift": float(drift[-1]),
         "energy_drift_max": float(np.abs(drift).max()),
-        "energy_injected": float(history["energy_injected"][-1] / scale_of_energy),
-        "momentum_change": max((float(abs(p[-1] - p[0])) / scale for p in momentum), default=None),
+        "energy_injected": float(history["energy_injected"][-1] / baseline(history).scale),
+        "momentum_change": _momentum_change(history, particles, scene),
+        "volume_ratio": None if ratio is None else float(ratio[-1]),
+        "volume_ratio_worst": None if ratio is None else float(_farthest_from_one(ratio)),
     }
+
+
+def baseline(history) -> Baseline:
+    """What the energy drift of a run is measured by, from the first row of its history."""
+    potential = history["potential_energy"][0] if "potential_energy" in history else 0.0
+    return Baseline.of(
+        history["kinetic_energy_without_bulk"][0], history["internal_energy"][0], potential
+    )
+
+
+def _momentum_change(history, particles, scene) -> float | None:
+    kept = np.flatnonzero(scene.keeps_momentum)
+    if kept.size == 0:
+        return None
+    momentum = np.array([history[f"momentum_{'xyz'[axis]}"] for axis in kept])
+    p = particles
+    with np.errstate(invalid="ignore"):  # the last state of a run that failed
+        bulk = scene.keeps_momentum * (p.velocity @ p.mass) / p.mass.sum()
+        sound_speed = scene.eos.sound_speed(p.density, p.pressure_by(scene.eos))
+        speed = np.linalg.norm(p.velocity - bulk[:, None], axis=0)
+        scale = float(np.sum(p.mass * (speed + sound_speed)))
+    return float(np.abs(momentum - momentum[:, :1]).max() / scale)
+
+
+def _farthest_from_one(ratio: np.ndarray) -> float:
+    return ratio[np.argmax(np.abs(np.log(ratio)))]
 
 
 def cost(simulation, history) -> dict:
@@ -105,36 +135,62 @@ def peak_memory() -> int:
 
 
 def in_words(summary: dict) -> str:
-    """The closing words of a run."""
-    cost, kept = summary["cost"], summary["conservation"]
-    session = cost["session"]
-    rate = session["updates_per_cpu_second"] or 0
+    """The closing words of a run: how it ended, its warnings, errors, what it kept and its cost."""
     lines = [
         f"{summary['problem']}: {summary['particles']} particles to t = {summary['time']:.6g} "
-        f"in {summary['steps']} steps ({summary['status']}).",
+        f"in {summary['steps']} steps ({_ending(summary)}).",
+        *(f"Warning: {one['text']}" for one in summary["warnings"]),
+        _errors_in_words(summary),
+        *(
+            f"  {name.replace('_', ' ')}: {value:.6g}"
+            for name, value in (summary["report"] or {}).items()
+        ),
+        _kept_in_words(summary["conservation"]),
+        _cost_in_words(summary["cost"]),
     ]
-    if summary["errors"]:
-        fields = ", ".join(
-            f"{name.replace('_', ' ')} {norm['L1']:.3g}"
-            for name, norm in summary["errors"]["fields"].items()
-        )
-        named = summary["errors"].get("reference")
-        truth = "the exact solution" if named is None else f"the run {named}"
-        lines.append(f"Error (L1 against {truth}, {summary['errors']['region']}): {fields}.")
-    else:
-        lines.append("Error: this problem has no exact solution here.")
-    for name, value in (summary["report"] or {}).items():
-        lines.append(f"  {name.replace('_', ' ')}: {value:.6g}")
-    change = kept["momentum_change"]
-    momentum = "walls take momentum up" if change is None else f"momentum to {change:.2g}"
-    injected = kept["energy_injected"]
-    kept_positive = f" (of it {injected:.2g} keeps energies positive)" if injected else ""
-    lines.append(
-        f"Kept: energy to {kept['energy_drift_max']:.2g} at worst{kept_positive}; {momentum}."
+    return "\n".join(lines)
+
+
+def _ending(summary: dict) -> str:
+    count = len(summary["warnings"])
+    warned = f", with {count} warning{'s' * (count > 1)}" if count else ""
+    return f"{summary['status']}{warned}"
+
+
+def _errors_in_words(summary: dict) -> str:
+    errors = summary["errors"]
+    if not errors:
+        return "Error: this problem has no exact solution here."
+    fields = ", ".join(
+        f"{name.replace('_', ' ')} {norm['L1']:.3g}" for name, norm in errors["fields"].items()
     )
-    lines.append(
+    named = errors.get("reference")
+    truth = "the exact solution" if named is None else f"the run {named}"
+    return f"Error (L1 against {truth}, {errors['region']}): {fields}."
+
+
+def _kept_in_words(kept: dict) -> str:
+    change, injected, ratio = (
+        kept[name] for name in ("momentum_change", "energy_injected", "volume_ratio")
+    )
+    parts = [f"energy to {kept['energy_drift_max']:.2g}"]
+    if injected:
+        parts[0] += f" ({injected:.2g} of it to keep internal energies positive)"
+    parts.append(
+        "momentum is not conserved at walls or in a field"
+        if change is None
+        else f"momentum to {change:.2g}"
+    )
+    if ratio is not None:
+        parts.append(f"sum m/rho is {ratio:.4g} of the volume")
+    return f"Conserved, at worst over the run: {'; '.join(parts)}."
+
+
+def _cost_in_words(cost: dict) -> str:
+    session = cost["session"]
+    rate = session["updates_per_cpu_second"] or 0
+    return (
         f"Cost: {session['wall_seconds']:.3g} s, {session['cpu_seconds']:.3g} CPU s on "
         f"{cost['threads']} thread(s), of which {session['compile_cpu_seconds']:.2g} s compiling; "
-        f"{rate / 1000:.3g} thousand updates per CPU-second."
+        f"{rate:,} particle updates per CPU-second."
     )
-    return "\n".join(lines)

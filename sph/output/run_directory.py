@@ -1,20 +1,27 @@
 """The directory of a run: where everything is, and what may be replaced."""
 
 import fcntl
+import json
 import os
 import re
 import shutil
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
+
 from sph.errors import FileError
-from sph.output import checkpoint
+from sph.output import checkpoint, history
 from sph.output.files import explained, is_unfinished, remove_unfinished, write_text
 from sph.output.json_text import json_text
 
 CHECKPOINT_NAME = re.compile(r"checkpoint_(\d{6,})\.h5")
+
+# A checkpoint of a run that failed is good while energy has drifted by less than this part of
+# physics.max_energy_drift: before a collapse the drift grows by more than that from step to step.
+GOOD = 0.1
 
 # First line of config.toml: what tells a run directory from a user's folder of the same look,
 # before --force may remove anything from it.
@@ -99,6 +106,15 @@ class RunDirectory:
         named = [path for path in found if checkpoint_number(path) is not None]
         return sorted(named, key=checkpoint_number)
 
+    @property
+    def has_failed(self) -> bool:
+        """Whether the summary says so."""
+        try:
+            found = json.loads(self.summary.read_text(encoding="utf-8"))
+        except (OSError, ValueError):
+            return False
+        return isinstance(found, dict) and found.get("status") == "failed"
+
     def latest(self) -> Path:
         """The last checkpoint that can be read. Raises FileError where there is none."""
         reason = "it has no checkpoints"
@@ -110,6 +126,21 @@ class RunDirectory:
             else:
                 return path
         raise FileError(f"{self.path} cannot be restarted: {reason}")
+
+    def last_good(self) -> Path:
+        """Of a run that failed, the last checkpoint from which energy had hardly drifted.
+
+        A step that goes wrong is found some steps later: a checkpoint written in between holds the
+        wrong state already. Raises FileError where none can be read.
+        """
+        drifts = history.read(self.history)
+        drift = dict(zip(drifts["step"], np.abs(drifts["energy_drift"]), strict=True))
+        for path in reversed(self.checkpoints()):
+            with suppress(FileError):
+                one = checkpoint.read(path)
+                if drift.get(one.step, 0.0) <= GOOD * one.config.physics.max_energy_drift:
+                    return path
+        return self.latest()
 
     def drop_checkpoints_after(self, number: int) -> None:
         """Remove later checkpoints, and what a killed run left unfinished. Raises FileError."""
@@ -180,12 +211,14 @@ def checkpoint_number(path: Path) -> int | None:
 def find(run_or_checkpoint: Path) -> tuple[RunDirectory | None, Path]:
     """What to restart from: a run directory's last good checkpoint, or that very checkpoint.
 
+    Of a run that failed that is `RunDirectory.last_good`, else the last that can be read.
+
     The run directory is None for a checkpoint that is in none. Raises FileError.
     """
     path = Path(run_or_checkpoint)
     if path.is_dir():
         run = RunDirectory.open(path)
-        return run, run.latest()
+        return run, run.last_good() if run.has_failed else run.latest()
     if not path.exists():
         raise FileError(f"{path} does not exist.\nTry: a run directory, or a checkpoint in one.")
     run = RunDirectory(path.absolute().parent.parent)

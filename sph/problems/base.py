@@ -18,10 +18,18 @@ class InitialState(NamedTuple):
 
 
 class Limit(NamedTuple):
-    """A figure of the summary that must stay below `bound`, with the reason for the number."""
+    """A figure of the summary that must stay below `bound`, with the reason for the number.
+
+    Or, with `at_least`, not fall below it.
+    """
 
     bound: float
     reason: str
+    at_least: bool = False
+
+    def holds(self, value: float) -> bool:
+        """Whether `value` is within; NaN never is."""
+        return value >= self.bound if self.at_least else value <= self.bound
 
 
 class Section(BaseModel):
@@ -39,6 +47,8 @@ class Problem(Section):
                  configuration must keep, each with the reason for the number
       ideal_gas  whether its solution is that of an ideal gas, so that others are refused
       radial     whether, in 2-D and 3-D, the solution depends on the distance from `centre` alone
+      fills_box  whether the gas fills the box, so that in a closed one sum m/rho is its volume
+      swamped    figures beyond whose bound the problem's small signal is lost in numerical noise
       profiled   whether profiles over x, or that distance, show the solution; maps do else
     """
 
@@ -46,6 +56,8 @@ class Problem(Section):
     limits: ClassVar[dict[str, Limit]] = {}
     ideal_gas: ClassVar[bool] = False
     radial: ClassVar[bool] = False
+    fills_box: ClassVar[bool] = True
+    swamped: ClassVar[dict[str, Limit]] = {}
     profiled: ClassVar[bool] = True
 
     name: str = Field(description="which problem: `sph list` names them")
@@ -76,6 +88,10 @@ class Problem(Section):
     def centre(self) -> np.ndarray:
         """(D,) the middle of the box."""
         return self.box.mean(axis=1)
+
+    def allowed(self) -> dict[str, Limit]:
+        """The limits that a run of this very configuration must keep, or its summary warns."""
+        return self.limits
 
     def initial(self, eos) -> InitialState:
         """The particles at t = 0 for that equation of state."""

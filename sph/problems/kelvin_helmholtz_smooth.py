@@ -51,7 +51,13 @@ class Problem(base.Problem):
     limits: ClassVar = {
         "energy_drift": base.Limit(
             1e-3, "a smooth flow, whose energy the scheme conserves to the order of the time step"
-        )
+        ),
+        "growth_ratio": base.Limit(
+            0.6, "0.71 with 64 x 64 particles and the default kernel and eta", at_least=True
+        ),
+    }
+    swamped: ClassVar = {
+        "growth_ratio": base.Limit(0.25, "a quarter of the linear growth rate", at_least=True)
     }
 
     name: Literal["kelvin_helmholtz_smooth"] = "kelvin_helmholtz_smooth"

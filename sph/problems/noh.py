@@ -37,6 +37,7 @@ class Problem(base.Problem):
     }
     ideal_gas: ClassVar = True
     radial: ClassVar = True
+    fills_box: ClassVar = False
     limits: ClassVar = {
         "energy_drift": base.Limit(2e-3, "all kinetic energy turns into heat at a strong shock"),
         "planar_norm_density": base.Limit(

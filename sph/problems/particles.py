@@ -21,6 +21,7 @@ class Problem(base.Problem):
         "time.end": 1.0,
         "output.interval": 0.5,
     }
+    fills_box: ClassVar = False
     limits: ClassVar = {
         "energy_drift": base.Limit(1e-3, "what a leapfrog may lose on any gas"),
         "momentum_change": base.Limit(1e-12, "pairs push one another equally: round-off"),

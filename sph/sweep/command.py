@@ -67,7 +67,10 @@ class _Told:
         reason = f": {outcome.reason}" if outcome.reason else ""
         status = MARKS[outcome.status]
         width = len(str(self.points))
-        self.shown.note(f"[{ended:{width}d}/{self.points}] {outcome.name} {status}{how}{reason}")
+        warned = f", with warnings: {', '.join(outcome.warnings)}" if outcome.warnings else ""
+        self.shown.note(
+            f"[{ended:{width}d}/{self.points}] {outcome.name} {status}{how}{warned}{reason}"
+        )
         self.shown.ended(ended)
 
     def closing(self) -> str:
@@ -79,7 +82,11 @@ class _Told:
             raise NumericalError(f"{done}, {len(lists['failed'])} failed:{reasons}")
         if lists["stopped"]:
             raise Stopped(f"{done}; the same command goes on with the rest.")
-        return f"{done}."
+        return f"{done}{self._warned()}."
+
+    def _warned(self) -> str:
+        count = sum(bool(one.warnings) for one in self.outcomes)
+        return f", {count} of them ended with warnings" if count else ""
 
 
 def _first_line(outcome: Outcome) -> str:

@@ -17,6 +17,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import BinaryIO, NamedTuple
 
+from sph import warnings
 from sph.errors import FileError, NumericalError, SphError, Stopped
 from sph.output.files import explained, write_text
 from sph.output.run_directory import RunDirectory
@@ -34,6 +35,7 @@ class Outcome(NamedTuple):
     reason: str = ""
     how: str = ""  # "run" or "restart" in this attempt; empty where nothing was done
     code: int = 0  # exit code of this attempt
+    warnings: tuple[str, ...] = ()  # the kinds of warning that a done point ended with
 
 
 @dataclass(frozen=True)
@@ -95,7 +97,7 @@ def execute(task: Task, stops: Callable[[], int] = lambda: 0) -> Outcome:
             raise FileError(f"{task.sweep.path} is not there: the sweep's files must be shared")
         with _locked(task.log, stops) as log:
             if task.status == "done":
-                return Outcome(task.point.name, "done")
+                return _done(task)
             return _attempt(task, log, stops)
     except Stopped as stopped:
         return Outcome(task.point.name, "stopped", str(stopped))
@@ -107,10 +109,15 @@ def standing(task: Task) -> Outcome:
     """How a point stands by its files, whoever ran it."""
     name = task.point.name
     if task.status == "done":
-        return Outcome(name, "done")
+        return _done(task)
     if task.failure.is_file():
         return Outcome(name, "failed", task.failure.read_text(encoding="utf-8").strip())
     return Outcome(name, "stopped", "it has not ended")
+
+
+def _done(task: Task, how: str = "") -> Outcome:
+    warned = tuple(warnings.kinds(_summary(task.run)))
+    return Outcome(task.point.name, "done", how=how, warnings=warned)
 
 
 def _attempt(task: Task, log: BinaryIO, stops: Callable[[], int]) -> Outcome:
@@ -126,7 +133,7 @@ def _attempt(task: Task, log: BinaryIO, stops: Callable[[], int]) -> Outcome:
     code = _wait(child, stops)
     how, name = command[3], task.point.name
     if code == 0 and task.status == "done":
-        return Outcome(name, "done", how=how)
+        return _done(task, how)
     if code == Stopped.exit_code or code < 0:
         reason = f"ended by signal {-code}" if code < 0 else "stopped, with a checkpoint"
         return Outcome(name, "stopped", reason, how)

@@ -123,7 +123,7 @@ def test_run_tells_the_summary_and_nothing_else_on_stdout(done):
     # the tube takes the number nearest to 60 that fills both sides
     assert re.fullmatch(r"shock_tube: 61 particles to t = 0\.2 in \d+ steps \(done\)\.", lines[0])
     assert lines[1].startswith("Error (L1 against the exact solution, the whole domain): density ")
-    assert any(line.startswith("Kept: energy to ") for line in lines)
+    assert any(line.startswith("Conserved, at worst over the run: energy to ") for line in lines)
     assert any(line.startswith("Cost: ") and "compiling" in line for line in lines)
     assert lines[-1] == f"Results: {run} (`sph plot {run}` draws them)."
     assert "wrote checkpoint_000004.h5" in result.stderr
@@ -139,8 +139,8 @@ def test_a_run_directory_holds_what_is_promised(done):
     resolved = configuration.load(run / "config.toml")
     assert resolved == configuration.from_text(TUBE)
     assert set(json.loads((run / "summary.json").read_text())) == {
-        "status", "reason", "version", "problem", "dimension", "particles", "time", "steps",
-        "errors", "report", "conservation", "cost", "compiled_in", "left_out",
+        "status", "reason", "warnings", "version", "problem", "dimension", "particles", "time",
+        "steps", "errors", "report", "conservation", "cost", "compiled_in", "left_out",
     }  # fmt: skip
 
 

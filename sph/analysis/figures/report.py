@@ -146,6 +146,11 @@ def _lines(panel, report: Report, lines: Sequence[Series], x: np.ndarray, note) 
             x[which], report.error[which], marker + "-", ms=5, mew=0, color=colours[line.group],
             label=label or "all runs", zorder=3,
         )  # fmt: skip
+        warned = [i for i in which if report.rows[i].warnings]
+        panel.plot(
+            x[warned], report.error[warned], marker, ms=5, mew=1.2, mfc="white",
+            color=colours[line.group], zorder=4,
+        )  # fmt: skip
 
 
 def _front(panel, report: Report) -> None:

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from sph import warnings
 from sph.config.toml_text import value_text
 from sph.errors import FileError
 from sph.output.run_directory import RunDirectory
@@ -45,6 +46,11 @@ class Row:
     def truth(self) -> str | None:
         """The run that its errors are against, or None where that is the exact solution."""
         return (self.reference or self.summary.get("errors") or {}).get("reference")
+
+    @property
+    def warnings(self) -> list[str]:
+        """The kinds of warning that it ended with."""
+        return warnings.kinds(self.summary)
 
     @property
     def steps(self) -> int:

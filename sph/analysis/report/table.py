@@ -75,6 +75,8 @@ def _cells(report: Report) -> list[list[str]]:
     header = [*(["sweep"] if several else []), *shown, "N", "steps"]
     header += [] if question.cost == "n" else [COSTS[question.cost][1]]
     header += [question.error_name, "energy drift", "against the front"]
+    warned = any(row.warnings for row in report.rows)
+    header += ["warnings"] if warned else []
     lines = []
     for i, row in enumerate(report.rows):
         line = [row.sweep] if several else []
@@ -83,7 +85,8 @@ def _cells(report: Report) -> list[list[str]]:
         drift = row.summary["conservation"]["energy_drift_max"]
         drifted = f"{drift:.1e}" if isinstance(drift, float) else str(drift)
         against = "front" if report.on_front[i] else f"× {report.excess[i]:.2f}"
-        lines.append([*line, f"{report.error[i]:.3g}", drifted, against])
+        line += [f"{report.error[i]:.3g}", drifted, against]
+        lines.append([*line, ", ".join(row.warnings) or "–"] if warned else line)
     return [header, *lines]
 
 
@@ -114,6 +117,7 @@ def _record(report: Report, row: Row) -> dict:
         "wall_seconds": row.cost["wall"],
         "compile_cpu_seconds": cost["session"]["compile_cpu_seconds"],
         "threads": cost["threads"],
+        "warnings": " ".join(row.warnings),
     }
     for name in row.figures():
         if "." in name:

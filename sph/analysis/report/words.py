@@ -68,6 +68,9 @@ def _standing(report: Report, line: Series) -> str:
 
 def _warnings(report: Report) -> list[str]:
     said = []
+    warned = [f"{row.name} ({', '.join(row.warnings)})" for row in report.rows if row.warnings]
+    if warned:
+        said.append(f"Ended with warnings (hollow in the pictures): {'; '.join(warned)}.")
     restarted = [row.name for row in report.rows if row.is_restarted]
     if restarted and report.question.cost in ("cpu", "wall"):
         said.append(

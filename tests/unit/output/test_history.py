@@ -28,7 +28,8 @@ def append(history, steps):
 
 
 def test_columns():
-    expected = "step t dt limiter_particle limiter kinetic_energy internal_energy total_energy "
+    expected = "step t dt limiter_particle limiter kinetic_energy "
+    expected += "kinetic_energy_without_bulk internal_energy total_energy energy_drift "
     expected += "energy_injected momentum_x momentum_y min_density max_density min_internal_energy "
     expected += "max_internal_energy wall_seconds cpu_seconds"
     assert columns(2) == expected.split()

@@ -138,7 +138,7 @@ def test_nobody_runs_a_point_that_another_process_is_at(program):
     with task.log.open("ab") as held:
         fcntl.flock(held, fcntl.LOCK_EX)
         outcome = execute(task, stops=lambda: 1)
-        assert outcome == ("problem.n=40", "stopped", "another process is at it", "", 0)
+        assert outcome == ("problem.n=40", "stopped", "another process is at it", "", 0, ())
         found = []
         waiting = threading.Thread(target=lambda: found.append(execute(task)))
         waiting.start()
@@ -149,7 +149,7 @@ def test_nobody_runs_a_point_that_another_process_is_at(program):
         task.run.path.mkdir()
         task.run.write_summary({"status": "done"})
     waiting.join(10.0)
-    assert found == [("problem.n=40", "done", "", "", 0)]
+    assert found == [("problem.n=40", "done", "", "", 0, ())]
 
 
 def test_an_orphan_keeps_its_lock(program, tmp_path):

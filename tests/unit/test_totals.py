@@ -1,0 +1,111 @@
+"""Sums over particles, and the energy drift, which no bulk motion may hide."""
+
+import numpy as np
+import pytest
+
+from sph import config as configuration
+from sph import totals
+from sph.particles import Particles
+from sph.totals import Baseline
+
+RANDOM = np.random.default_rng(3)
+
+
+def gas(dimension=2, n=50, boost=0.0):
+    particles = Particles.at_start(
+        RANDOM.uniform(size=(dimension, n)), RANDOM.normal(size=(dimension, n)),
+        RANDOM.uniform(1.0, 2.0, n), RANDOM.uniform(1.0, 2.0, n),
+    )  # fmt: skip
+    particles.density[:] = RANDOM.uniform(1.0, 2.0, n)
+    particles.velocity[0] += boost
+    return particles
+
+
+@pytest.mark.parametrize("boost", [0.0, 1e-3, 1.0, 1e3, 1e6])
+def test_kinetic_energy_without_bulk_is_the_same_in_every_frame(boost):
+    particles = gas()
+    still = totals.of(particles, None, np.ones(2))
+    particles.velocity += np.array([[boost], [-0.3 * boost]])
+    moving = totals.of(particles, None, np.ones(2))
+    # velocities round at 1e-16 of the boost, and their errors add up at random
+    assert moving.kinetic_energy_without_bulk == pytest.approx(
+        still.kinetic_energy_without_bulk, rel=1e-14 + 1e-15 * boost
+    )
+    mass, bulk = particles.mass.sum(), still.momentum / particles.mass.sum()
+    expected = still.kinetic_energy - 0.5 * mass * (bulk @ bulk)
+    assert still.kinetic_energy_without_bulk == pytest.approx(expected, rel=1e-13)
+
+
+def test_axes_that_do_not_keep_momentum_keep_their_bulk_motion():
+    particles = gas(boost=5.0)
+    none = totals.of(particles, None, np.zeros(2))
+    assert none.kinetic_energy_without_bulk == pytest.approx(none.kinetic_energy, rel=1e-14)
+    along_y = totals.of(particles, None, np.array([0.0, 1.0]))
+    bulk = none.momentum[1] / particles.mass.sum()
+    expected = none.kinetic_energy - 0.5 * particles.mass.sum() * bulk**2
+    assert along_y.kinetic_energy_without_bulk == pytest.approx(expected, rel=1e-13)
+
+
+def test_volume_is_the_sum_of_mass_over_density():
+    particles = gas(dimension=3)
+    expected = (particles.mass / particles.density).sum()
+    assert totals.of(particles, None, np.ones(3)).volume == pytest.approx(expected, rel=1e-14)
+
+
+@pytest.mark.parametrize(
+    ("kinetic", "internal", "potential", "scale"),
+    [
+        (1.0, 2.0, 0.0, 3.0),
+        # potential energy cancels the rest, which an error is measured by
+        (1.0, 2.0, -3.0, 3.0),
+        # gas bound deeply, with little energy of its own
+        (1.0, 0.0, -100.0, 99.0),
+    ],
+)
+def test_drift_is_relative_to_what_there_was(kinetic, internal, potential, scale):
+    baseline = Baseline.of(kinetic, internal, potential)
+    now = totals.of(gas(), None, np.ones(2))._replace(
+        kinetic_energy_without_bulk=kinetic + 0.3, internal_energy=internal + 0.25,
+        potential_energy=potential,
+    )  # fmt: skip
+    # a quarter was added by heating, which is no drift
+    assert baseline.drift(now, added=0.25) == pytest.approx(0.3 / scale, rel=1e-13)
+
+
+def test_gas_without_any_energy_drifts_endlessly_or_not_at_all():
+    nothing = Baseline.of(0.0, 0.0, 0.0)
+    now = totals.of(gas(), None, np.ones(2))._replace(
+        kinetic_energy_without_bulk=0.0, internal_energy=0.0
+    )
+    assert nothing.drift(now, 0.0) == 0.0
+    assert nothing.drift(now._replace(internal_energy=1e-9), 0.0) == np.inf
+
+
+VORTEX = """
+[problem]
+name = "gresho"
+n = 400
+velocity = [{boost}, 0.0]
+[physics]
+C = {C}
+max_energy_drift = 1e9
+[time]
+end = 0.5
+[output]
+interval = 0.5
+"""
+
+
+@pytest.mark.parametrize("boost", [300.0, 3e5])
+@pytest.mark.parametrize("C", [0.15, 1.5])
+def test_a_vortex_that_is_carried_along_drifts_as_it_does_at_rest(simulate, boost, C):
+    """A step ten times too long multiplies the vortex's energy; bulk motion made that 3e-4."""
+    drifts = []
+    for speed in (0.0, boost):
+        simulation = simulate(configuration.from_text(VORTEX.format(boost=speed, C=C)))
+        while simulation.time < 0.5 and simulation.step < 30:
+            simulation.advance(0.5)
+        drifts.append(simulation.energy_drift)
+    at_rest, moving = drifts
+    # particles are moved and wrapped with rounding of 1e-16 of the way, which noise then amplifies
+    assert moving == pytest.approx(at_rest, rel=0.1, abs=1e-7)
