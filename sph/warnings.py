@@ -60,7 +60,8 @@ def _swamped(problem, summary) -> Iterator[Warning]:
         if value is not None and not limit.holds(value):
             yield Warning(
                 "swamped",
-                f"the problem's signal is lost in numerical noise: {_beyond(name, value, limit)}",
+                f"the problem's signal is lost in numerical noise: {_beyond(name, value, limit)} "
+                "Try a larger physics.eta with a smoother physics.kernel, or more particles.",
             )
 
 
@@ -69,8 +70,8 @@ def _energy(kept) -> Iterator[Warning]:
     if not drift <= DRIFT:
         yield Warning(
             "energy_drift",
-            f"total energy drifted by {100 * drift:.2g} %, more than {100 * DRIFT:g} %: the time "
-            "step is too long. Try a smaller physics.C.",
+            f"total energy drifted by {100 * drift:.2g} %, more than {100 * DRIFT:g} %. Try a "
+            "smaller physics.C or, where that does not help, a larger physics.eta.",
         )
 
 
@@ -110,14 +111,21 @@ def _held(simulation) -> Iterator[Warning]:
 def _limits(problem, summary) -> Iterator[Warning]:
     for name, limit in problem.allowed().items():
         value = figure(summary, name)
-        said = name == "energy_drift" and not limit.bound > DRIFT and not value <= DRIFT
-        if value is not None and not limit.holds(value) and not said:
-            yield Warning("limit", _beyond(name, value, limit))
+        if value is None or limit.holds(value) or _is_said(name, problem, summary):
+            continue
+        yield Warning("limit", _beyond(name, value, limit))
+
+
+def _is_said(name: str, problem, summary) -> bool:
+    """Whether another kind of warning tells of that figure."""
+    if name == "energy_drift":
+        return any(_energy(summary["conservation"]))
+    return name in problem.swamped and not problem.swamped[name].holds(figure(summary, name))
 
 
 def _beyond(name: str, value: float, limit) -> str:
     side = "below" if limit.at_least else "above"
     return (
-        f"{name.replace('_', ' ')} is {value:.3g}, {side} the {limit.bound:g} that this problem "
-        f"allows ({limit.reason})."
+        f"{name.replace('_', ' ')} is {value:.3g}, {side} the limit of {limit.bound:g} "
+        f"({limit.reason})."
     )

@@ -43,8 +43,8 @@ class Problem(base.Problem):
         "planar_norm_density": base.Limit(
             0.018, "an independent transcription of the equations gives .0169 with 100 particles"
         ),
-        "planar_norm_pressure": base.Limit(0.006, "the same: .0052"),
-        "planar_norm_velocity": base.Limit(0.008, "the same: .0070"),
+        "planar_norm_pressure": base.Limit(0.006, "the same transcription gives .0052"),
+        "planar_norm_velocity": base.Limit(0.008, "the same transcription gives .0070"),
     }
 
     name: Literal["noh"] = "noh"

@@ -1,0 +1,195 @@
+"""Warnings: every kind by a scene that gives it, and a shipped scene that gives none."""
+
+import json
+import re
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner
+
+from sph import warnings
+from sph.cli import main
+from sph.problems.base import Limit
+
+DOCUMENT = Path(__file__).parents[2] / "docs" / "warnings.md"
+
+SCENES = {
+    # gas at rest, disturbed, with 2.6 neighbours on average
+    "volume": """
+[problem]
+name = "uniform"
+dimension = 1
+n = 100
+noise = 0.2
+[physics]
+eta = 0.8
+""",
+    # twice the largest stable step; the energy limit would shorten it
+    "energy_drift": """
+[problem]
+name = "shock_tube"
+n = 60
+[physics]
+C = 0.6
+energy_limit = false
+max_energy_drift = 1.0
+[time]
+end = 0.1
+""",
+    # open on all sides, with supports that are to stay as narrow as the ball
+    "held_supports": """
+[problem]
+name = "expanding_ball"
+dimension = 2
+n = 100
+[physics]
+max_support = 0.5
+[time]
+end = 1.0
+""",
+    # half of the particles with which the shipped configuration keeps its limits
+    "limit": """
+[problem]
+name = "noh"
+n = 50
+""",
+    # a wave of amplitude 1e-6 on a glass, whose noise is a hundred times as large
+    "swamped": """
+[problem]
+name = "sound_wave"
+dimension = 2
+n = 400
+lattice = "relaxed"
+[time]
+end = 0.05
+""",
+}
+
+
+def sph(*arguments):
+    return CliRunner().invoke(main, [*map(str, arguments)])
+
+
+@pytest.fixture(scope="module")
+def ended(tmp_path_factory):
+    """ended(kind): the result and the run directory of its scene, run once."""
+    kept = {}
+
+    def once(kind):
+        if kind not in kept:
+            folder = tmp_path_factory.mktemp(kind)
+            (folder / "scene.toml").write_text(SCENES[kind])
+            kept[kind] = sph("run", folder / "scene.toml", "-o", folder / "run"), folder / "run"
+        return kept[kind]
+
+    return once
+
+
+@pytest.mark.parametrize("kind", SCENES)
+def test_a_scene_of_each_kind_ends_with_its_warning(ended, kind):
+    result, run = ended(kind)
+    assert result.exit_code == 0
+    told = json.loads((run / "summary.json").read_text())["warnings"]
+    assert kind in [one["kind"] for one in told]
+    count = f"{len(told)} warning{'s' * (len(told) > 1)}"
+    first, *others = result.stdout.splitlines()
+    assert first.endswith(f"(done, with {count}).")
+    assert others[: len(told)] == [f"Warning: {one['text']}" for one in told]
+    said = re.search(r"^sph: .* ended with warnings: (.*) \(see docs/warnings\.md\)\.$",
+                     result.stderr, re.MULTILINE)  # fmt: skip
+    assert kind in said[1].split(", ")
+
+
+def test_strict_exits_with_3_where_there_are_warnings(ended, tmp_path):
+    scene = tmp_path / "scene.toml"
+    scene.write_text(SCENES["limit"])
+    result = sph("run", scene, "-o", tmp_path / "run", "--strict")
+    assert result.exit_code == 3
+    assert "ended with warnings: limit" in result.stderr
+    # the run itself is done and complete
+    assert json.loads((tmp_path / "run" / "summary.json").read_text())["status"] == "done"
+    assert sph("report", tmp_path / "run").exit_code == 0
+
+
+def test_a_sound_run_has_no_warnings_strict_or_not(tmp_path):
+    scene = tmp_path / "scene.toml"
+    scene.write_text('[problem]\nname = "shock_tube"\nn = 60\n')
+    result = sph("run", scene, "-o", tmp_path / "run", "--strict")
+    assert result.exit_code == 0
+    assert result.stdout.splitlines()[0].endswith("(done).")
+    assert "warning" not in (result.stdout + result.stderr).lower()
+
+
+def test_reports_and_sweeps_mark_runs_with_warnings(ended, tmp_path):
+    scene = tmp_path / "scene.toml"
+    scene.write_text(SCENES["limit"])
+    swept = sph("sweep", scene, "--vary", "problem.n=50,100", "-o", tmp_path / "sweep", "--jobs", 1)
+    assert re.search(r"problem\.n=50 done, with warnings: limit$", swept.stderr, re.MULTILINE)
+    assert re.search(r"problem\.n=100 done$", swept.stderr, re.MULTILINE)
+    assert "2 of 2 points are done, 1 of them ended with warnings." in swept.stdout
+    report = sph("report", tmp_path / "sweep").stdout
+    header, coarse, fine = report.splitlines()[:3]
+    assert header.split()[-1] == "warnings"
+    assert (coarse.split()[-1], fine.split()[-1]) == ("limit", "–")
+    assert "Ended with warnings (hollow in the pictures): problem.n=50 (limit)." in report
+
+
+def test_every_kind_has_its_row_in_the_document():
+    kinds = set(re.findall(r'Warning\(\s*"(\w+)"', Path(warnings.__file__).read_text()))
+    rows = set(re.findall(r"^\| `(\w+)` \|", DOCUMENT.read_text(), re.MULTILINE))
+    assert kinds == rows
+    # momentum is conserved by every pair force there is: no scene can lose it
+    assert kinds - {"momentum"} <= set(SCENES)
+
+
+KEPT = {
+    "energy_drift": 0.0, "energy_drift_max": 0.0, "energy_injected": 0.0, "momentum_change": 0.0,
+    "volume_ratio": 1.0, "volume_ratio_worst": 1.0,
+}  # fmt: skip
+
+
+class Scene:
+    """What a warning looks at of a simulation, and nothing amiss in it."""
+
+    def __init__(self, limits=None, swamped=None):
+        self.held_supports = 0
+        self.scene = self.config = self.problem = self
+        self.swamped = swamped or {}
+        self.allowed = lambda: limits or {}
+
+
+def told(kept=(), report=None, **of_problem):
+    summary = {"conservation": KEPT | dict(kept), "errors": None, "report": report or {}}
+    return [one.kind for one in warnings.of_run(Scene(**of_problem), summary)]
+
+
+@pytest.mark.parametrize(
+    ("kept", "expected"),
+    [
+        ({}, []),
+        ({"energy_drift_max": 0.99e-3}, []),
+        ({"energy_drift_max": 1.01e-3}, ["energy_drift"]),
+        ({"energy_drift_max": float("nan")}, ["energy_drift"]),
+        ({"momentum_change": 0.9e-6}, []),
+        ({"momentum_change": 1.1e-6}, ["momentum"]),
+        ({"momentum_change": None}, []),
+        ({"volume_ratio": 0.945}, []),
+        ({"volume_ratio": 0.935}, ["volume"]),
+        ({"volume_ratio": 1.065}, ["volume"]),
+        ({"volume_ratio": None}, []),
+        # what it was on the way, as particles settled, is no matter
+        ({"volume_ratio_worst": 0.5}, []),
+    ],
+)
+def test_bounds_of_what_is_conserved(kept, expected):
+    assert told(kept) == expected
+
+
+def test_a_figure_is_told_once():
+    drift = {"energy_drift": Limit(1e-4, "so")}
+    assert told({"energy_drift_max": 5e-4}, limits=drift) == ["limit"]
+    assert told({"energy_drift_max": 5e-3}, limits=drift) == ["energy_drift"]
+    ratio = {"limits": {"g": Limit(0.6, "so", at_least=True)},
+             "swamped": {"g": Limit(0.2, "so", at_least=True)}}  # fmt: skip
+    assert [told(report={"g": g}, **ratio) for g in (0.7, 0.5, 0.1)] == [[], ["limit"], ["swamped"]]
+    assert told(report={"other": 1.0}, **ratio) == []  # a run that stopped before it was known
