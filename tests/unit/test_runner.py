@@ -17,7 +17,7 @@ from sph import restarting, runner
 from sph.analysis.summary import in_words
 from sph.errors import ConfigError, FileError, NumericalError, Stopped
 from sph.output import checkpoint as checkpoints
-from sph.output.run_directory import RunDirectory
+from sph.output.run_directory import RunDirectory, find
 from sph.runner import output_times
 
 TUBE = """
@@ -397,6 +397,19 @@ def test_a_lone_checkpoint(tube, tmp_path):
     assert (first["limiter"], first["limiter_particle"]) == ("checkpoint", "0")
     unknown |= {"limiter": None, "limiter_particle": None}
     assert first | unknown == rows(tube)[step] | unknown
+
+
+def test_a_failed_run_goes_on_from_before_its_energy_drifted(tube, tmp_path):
+    """What goes wrong is found some steps later: a checkpoint in between holds it already."""
+    run = copy(tube, tmp_path / "run")
+    for number, drift in ((2, 1.9e-3), (3, -2.1e-3), (4, 0.019)):  # a tenth of 2 % is good enough
+        step = int(state(run.checkpoint_path(number))["step"])
+        rewritten(run, step, "energy_drift", lambda _, drift=drift: drift)
+    assert find(run.path)[1] == run.checkpoint_path(4)  # a run that is done, or was stopped
+    run.write_summary({"status": "failed"})
+    assert find(run.path)[1] == run.checkpoint_path(2)
+    run.checkpoint_path(2).write_bytes(b"damaged")
+    assert find(run.path)[1] == run.checkpoint_path(1)
 
 
 def test_a_run_at_its_end_stays_as_it_is(tube, tmp_path):
