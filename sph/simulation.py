@@ -3,7 +3,7 @@
 import numpy as np
 from numba.core.registry import cpu_target
 
-from sph import faults, passes, totals
+from sph import faults, passes, resolution, totals
 from sph.clock import Clock
 from sph.integrators import leapfrog, step_size
 from sph.neighbours.order import number_of_blocks
@@ -99,9 +99,11 @@ class Simulation:
     def begin(self) -> None:
         """Converged supports, rates, and the first step. Raises NumericalError."""
         self.watchdog.check_range(self)
+        resolution.check_extent(self)
         self._keep_predictions()
         self._build_lists(dt=0.0, guess=True)
         self._density(self.scene.starting_models)
+        resolution.check(self)
         self._rates(self.scene.starting_models)
         self._measure(past=None)
 

@@ -7,6 +7,8 @@ A warning says what was found, against what, and what to try.
 from collections.abc import Iterator
 from typing import Any, NamedTuple
 
+from sph import resolution
+
 # The stress suite holds its passing settings to this; more is an error of the time integration.
 DRIFT = 1e-3
 # Pairs push each other equally: more is neither round-off nor an error of the integration.
@@ -32,6 +34,7 @@ def of_run(simulation, summary: dict[str, Any]) -> list[Warning]:
         *_momentum(summary["conservation"]),
         *_volume(summary["conservation"]),
         *_held(simulation),
+        *_resolution(simulation),
         *_limits(problem, summary),
     ]
 
@@ -106,6 +109,11 @@ def _held(simulation) -> Iterator[Warning]:
             f"supports are held at {simulation.scene.max_support:.4g} and their densities are too "
             "low. Try a larger physics.max_support.",
         )
+
+
+def _resolution(simulation) -> Iterator[Warning]:
+    if text := resolution.doubt(simulation):
+        yield Warning("resolution", text)
 
 
 def _limits(problem, summary) -> Iterator[Warning]:

@@ -108,7 +108,9 @@ class Physics(Section):
         0.15, gt=0, description="Courant number: the time step in units of the stable one"
     )
     balsara: bool = Field(
-        True, description="less viscosity where the flow shears; without effect in 1-D"
+        True,
+        description="less viscosity where the flow shears or rotates; in 1-D, where nothing "
+        "rotates, only where |div v| is below 1e-4 c/H",
     )
     density_passes: Count | Literal["converged"] = Field(
         2, description="passes of the density and smoothing length iteration in a step"

@@ -1,4 +1,4 @@
-"""Kelvin-Helmholtz instability of a smooth shear layer, which converges with resolution.
+"""Kelvin-Helmholtz instability of a smooth shear layer, whose exact solution has no sharp contact.
 
 McNally, Lyra & Passy (2012), ApJS 201, 18: section 2 for the initial state, section 4 for the
 mode's amplitude. Its growth is held against linear theory, for the same initial state and

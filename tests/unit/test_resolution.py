@@ -1,0 +1,129 @@
+"""What float64 cannot resolve is refused before the first step, or told.
+
+The thresholds are bracketed by powers of 2, at which the gap between numbers doubles.
+"""
+
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from sph import config as configuration
+from sph import resolution
+from sph.clock import Clock
+from sph.errors import NumericalError
+from sph.scene import Scene
+from sph.simulation import Simulation
+
+CONFIGS = Path(__file__).parents[2] / "configs"
+
+UNIFORM = """
+[problem]
+name = "uniform"
+dimension = {dimension}
+n = 100
+domain = [{low!r}, {high!r}]
+boundary = "{boundary}"
+[time]
+end = 0.2
+[output]
+interval = 0.2
+"""
+
+
+def far_box(dimension, gap, boundary="periodic"):
+    """Gas in a box of length 1 so far from 0 that neighbouring numbers are `gap` apart there."""
+    low = gap * 2.0**52
+    return configuration.from_text(
+        UNIFORM.format(dimension=dimension, low=low, high=low + 1.0, boundary=boundary)
+    )
+
+
+# spacings are 0.01 in 1-D and 0.1 in 2-D
+@pytest.mark.parametrize("boundary", ["periodic", "open", "mirror"])
+@pytest.mark.parametrize(
+    ("dimension", "refused", "doubted"), [(1, 2.0**-18, 2.0**-28), (2, 2.0**-15, 2.0**-25)]
+)
+def test_positions_at_both_thresholds(simulate, dimension, refused, doubted, boundary):
+    with pytest.raises(NumericalError, match=r"resolve the position[\s\S]*nearer to 0") as caught:
+        resolution.check(simulate(far_box(dimension, refused, boundary)))
+    assert caught.value.particle > 0
+    for gap in (refused / 2, doubted):
+        simulation = simulate(far_box(dimension, gap, boundary))
+        resolution.check(simulation)
+        assert "does not resolve the position" in resolution.doubt(simulation)
+    simulation = simulate(far_box(dimension, doubted / 2, boundary))
+    resolution.check(simulation)
+    assert resolution.doubt(simulation) is None
+
+
+@pytest.mark.parametrize("dimension", [1, 2])
+def test_particles_that_coincide_for_rounding_are_refused_as_such(dimension):
+    clock = Clock()
+    simulation = Simulation.of_problem(Scene(far_box(dimension, 0.25)), 1, clock)
+    with pytest.raises(NumericalError, match="does not resolve the position"):
+        resolution.check_extent(simulation)
+    simulation.close()
+    clock.close()
+
+
+def change(simulation):
+    """Largest velocity over the speed of sound, and relative change of u, of gas at rest."""
+    u = simulation.particles.internal_energy[0]
+    while simulation.time < 0.2:
+        simulation.advance(0.2)
+    p = simulation.particles
+    return max(np.abs(p.velocity).max() / np.sqrt(1.4 * 0.4 * u), np.ptp(p.internal_energy) / u)
+
+
+def test_what_is_refused_is_wrong_and_what_is_not_is_right(simulate, monkeypatch):
+    assert change(simulate(far_box(1, 2.0**-19))) < 1e-3  # the largest gap that is not refused
+    assert change(simulate(far_box(1, 2.0**-29))) < 1e-6  # the largest of which nothing is told
+    monkeypatch.setattr(resolution, "REFUSED", np.inf)
+    # eight times the smallest gap that is refused: errors scatter by a factor of five
+    assert change(simulate(far_box(1, 2.0**-15))) > 1e-3
+
+
+def moving(name, mach):
+    config = configuration.load(CONFIGS / name)
+    return config.override([f"problem.velocity=[{mach * np.sqrt(1.4):.17g}, 0.0]"])
+
+
+def test_bulk_motion_at_both_thresholds(simulate):
+    shipped = simulate(configuration.load(CONFIGS / "moving_box.toml"))  # Mach 1e5
+    resolution.check(shipped)
+    assert resolution.doubt(shipped) is None
+    told = simulate(moving("moving_box.toml", 1e11))
+    resolution.check(told)
+    assert "does not resolve the velocity" in resolution.doubt(told)
+    for mach in (1e13, 1e17):
+        with pytest.raises(NumericalError, match=r"resolve the velocity[\s\S]*bulk velocity"):
+            resolution.check(simulate(moving("moving_box.toml", mach)))
+
+
+def gas(velocity, n=4):
+    return SimpleNamespace(
+        mass=np.ones(n), position=np.linspace(0.0, 1.0, n)[None], velocity=np.array([velocity])
+    )
+
+
+@pytest.mark.parametrize(
+    ("velocity", "sound_speed"),
+    [
+        ([1.0, 1.0, -1.0, -1.0], 1e-30),  # cold streams that meet: their velocities are resolved
+        ([0.0, 0.0, 0.0, 0.0], 0.0),  # gas without pressure at rest
+        ([0.0, 0.0, 0.0, 0.0], np.nan),  # gas torn apart: the watchdog tells
+    ],
+)
+def test_cold_gas_is_not_refused(velocity, sound_speed):
+    gap = resolution.largest_gap(gas(velocity), 0.3, np.full(4, sound_speed))
+    assert gap.ratio < 1e-14
+
+
+def test_a_dense_cloud_far_from_0_is_found_among_others(simulate):
+    """Each particle is measured by its own spacing, not by a mean or a median."""
+    particles = gas([0.0, 0.0, 0.0, 0.0])
+    gap = resolution.largest_gap(particles, np.array([1.0, 1.0, 1e-13, 1.0]), np.ones(4))
+    assert (gap.kind, gap.index) == ("position", 2)
+    assert gap.ratio > resolution.REFUSED
