@@ -26,6 +26,7 @@ class Problem(base.Problem):
         "physics.gamma": 5.0 / 3.0,
         "physics.alpha": 1.0,
         "physics.C": 0.1,
+        "physics.max_support": 10.0,  # as the gas thins, its supports outgrow the first ball
         "time.end": 5.0,
         "output.interval": 1.0,
     }
