@@ -5,7 +5,7 @@ import sys
 
 import numpy as np
 
-from sph.analysis import errors
+from sph.analysis import errors, truth
 from sph.version import __version__
 
 
@@ -29,18 +29,23 @@ def of_run(simulation, history: dict[str, np.ndarray], status: str, reason: str 
         "time": simulation.time,
         "steps": simulation.step,
         "errors": None,
+        "errors_left_out": None,
         "report": None,
         "conservation": conservation(history, particles, eos, pressure, problem.boundaries),
         "cost": cost(simulation, history),
         "compiled_in": inside,
         "left_out": outside,
     }
-    if status != "failed":
-        if not scene.config.report.reference:
-            exact = errors.against_exact(problem, eos, simulation.time, particles, pressure)
-            result["errors"] = exact
-        report = problem.report(eos, simulation.time, particles, pressure)
-        result["report"] = report | problem.over_time(eos, history)
+    if status == "failed":
+        result["errors_left_out"] = "the run failed"
+        return result
+    config, now = scene.config, simulation.time
+    if not config.report.reference:
+        result["errors"] = errors.against_exact(config, now, particles, pressure)
+        result["errors_left_out"] = truth.left_out(config, now, particles.position)
+    elif status != "done":
+        result["errors_left_out"] = "the run stopped before time.end"
+    result["report"] = truth.figures(config, now, particles, pressure, history)
     return result
 
 
@@ -104,6 +109,11 @@ def peak_memory() -> int:
     return peak if sys.platform == "darwin" else peak * 1024
 
 
+def _percent(relative: float | None) -> str:
+    """An error relative to the exact field, in brackets; nothing where that is zero."""
+    return "" if relative is None else f" ({100.0 * relative:.2g} %)"
+
+
 def in_words(summary: dict) -> str:
     """The closing words of a run."""
     cost, kept = summary["cost"], summary["conservation"]
@@ -115,14 +125,14 @@ def in_words(summary: dict) -> str:
     ]
     if summary["errors"]:
         fields = ", ".join(
-            f"{name.replace('_', ' ')} {norm['L1']:.3g}"
+            f"{name.replace('_', ' ')} {norm['L1']:.3g}{_percent(norm['relative_L1'])}"
             for name, norm in summary["errors"]["fields"].items()
         )
         named = summary["errors"].get("reference")
         truth = "the exact solution" if named is None else f"the run {named}"
         lines.append(f"Error (L1 against {truth}, {summary['errors']['region']}): {fields}.")
     else:
-        lines.append("Error: this problem has no exact solution here.")
+        lines.append(f"Error: left out, because {summary['errors_left_out']}.")
     for name, value in (summary["report"] or {}).items():
         lines.append(f"  {name.replace('_', ' ')}: {value:.6g}")
     change = kept["momentum_change"]
