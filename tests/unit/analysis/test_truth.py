@@ -44,6 +44,11 @@ ENDS = {
     "the box of a blast": (
         "point_explosion", (), (0.5 / 1.152) ** 2.5, "nearest face of the domain",
     ),
+    # sound in the background, at 0.0408, comes in from the faces until the shock reaches them
+    "a blast in an open box": (
+        "point_explosion", ("problem.background_pressure=1e-3", "problem.boundary=open"),
+        ((0.5 - 0.04082 * (0.5 / 1.152) ** 2.5) / 1.152) ** 2.5, "nearest face",
+    ),
     "a blast that weakens": (
         "point_explosion", ("problem.background_pressure=5",),
         (1e-3 * 0.75 * (0.4 * 1.152) ** 2 / 5.0) ** (1 / 1.2), "background_pressure",
@@ -141,6 +146,14 @@ def test_gas_that_falls_in_must_be_cold(dimension):
     )
     assert truth.departure(cold, 0.1) is None
     assert "cold gas" in truth.departure(warm, 0.1)
+
+
+def test_a_run_beyond_the_implosion_is_compared_with_a_finer_one_everywhere():
+    noh = made("noh").problem
+    x = np.array([[0.1, 0.9]])
+    inside, words = noh.error_region(made("noh").physics.eos_model(), 1.2, x)
+    assert inside.all()
+    assert words == "the whole domain"
 
 
 def test_errors_leave_out_what_the_ends_have_disturbed():
