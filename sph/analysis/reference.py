@@ -7,7 +7,7 @@ import h5py
 import numpy as np
 from scipy.spatial import cKDTree
 
-from sph.analysis.errors import FIELDS, norms
+from sph.analysis.errors import FIELDS, by_field
 from sph.config import Config
 from sph.domain import Domain
 from sph.errors import ConfigError, FileError
@@ -81,9 +81,7 @@ def errors_against(coarse: Checkpoint, reference: Reference, name: str) -> dict:
     )
     exact = at_points(fine, particles.position)
     inside = inside & np.isfinite(exact["density"])
-    volume = (particles.mass / particles.density)[inside]
-    state = _fields(coarse)
-    fields = {name: norms((state[name] - exact[name])[..., inside], volume) for name in FIELDS}
+    fields = by_field(_fields(coarse), exact, particles.mass / particles.density, inside)
     return {
         "region": words,
         "particles": int(inside.sum()),

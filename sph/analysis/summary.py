@@ -6,7 +6,7 @@ import sys
 import numpy as np
 
 from sph import warnings
-from sph.analysis import errors
+from sph.analysis import errors, truth
 from sph.totals import Baseline
 from sph.version import __version__
 
@@ -18,34 +18,43 @@ def of_run(simulation, history: dict[str, np.ndarray], status: str, reason: str 
     solution; where the configuration names a reference they are left to `reference.errors_against`.
     """
     scene, particles = simulation.scene, simulation.particles
-    problem, eos = scene.config.problem, scene.eos
-    pressure = particles.pressure_by(eos)
     inside, outside = scene.parts()
     result = {
         "status": status,
         "reason": reason,
         "warnings": [],
         "version": __version__,
-        "problem": problem.name,
+        "problem": scene.config.problem.name,
         "dimension": scene.dimension,
         "particles": particles.number,
         "time": simulation.time,
         "steps": simulation.step,
         "errors": None,
+        "errors_left_out": None,
         "report": None,
         "conservation": conservation(history, particles, scene),
         "cost": cost(simulation, history),
         "compiled_in": inside,
         "left_out": outside,
     }
-    if status != "failed":
-        if not scene.config.report.reference:
-            exact = errors.against_exact(problem, eos, simulation.time, particles, pressure)
-            result["errors"] = exact
-        report = problem.report(eos, simulation.time, particles, pressure)
-        result["report"] = report | problem.over_time(eos, history)
+    if status == "failed":
+        result["errors_left_out"] = "the run failed"
+    else:
+        _judge(result, simulation, history)
     warn(result, simulation)
     return result
+
+
+def _judge(result: dict, simulation, history) -> None:
+    """Set errors and the problem's own figures of a run that has not failed."""
+    config, now, particles = simulation.scene.config, simulation.time, simulation.particles
+    pressure = particles.pressure_by(simulation.scene.eos)
+    if not config.report.reference:
+        result["errors"] = errors.against_exact(config, now, particles, pressure)
+        result["errors_left_out"] = truth.left_out(config, now, particles.position)
+    elif result["status"] != "done":
+        result["errors_left_out"] = "the run stopped before time.end"
+    result["report"] = truth.figures(config, now, particles, pressure, history)
 
 
 def warn(summary: dict, simulation) -> None:
@@ -134,6 +143,11 @@ def peak_memory() -> int:
     return peak if sys.platform == "darwin" else peak * 1024
 
 
+def _percent(relative: float | None) -> str:
+    """An error relative to the exact field, in brackets; nothing where that is zero."""
+    return "" if relative is None else f" ({100.0 * relative:.2g} %)"
+
+
 def in_words(summary: dict) -> str:
     """The closing words of a run: how it ended, its warnings, errors, what it kept and its cost."""
     lines = [
@@ -160,9 +174,10 @@ def _ending(summary: dict) -> str:
 def _errors_in_words(summary: dict) -> str:
     errors = summary["errors"]
     if not errors:
-        return "Error: this problem has no exact solution here."
+        return f"Error: left out, because {summary['errors_left_out']}."
     fields = ", ".join(
-        f"{name.replace('_', ' ')} {norm['L1']:.3g}" for name, norm in errors["fields"].items()
+        f"{name.replace('_', ' ')} {norm['L1']:.3g}{_percent(norm['relative_L1'])}"
+        for name, norm in errors["fields"].items()
     )
     named = errors.get("reference")
     truth = "the exact solution" if named is None else f"the run {named}"

@@ -133,6 +133,7 @@ def resolve(
     if problem is not None:
         models["problem"] = problem
         _fill_defaults(raw, problem)
+        _fill_tables(raw["problem"], source, problem)
         issues += checks.shape_issues(raw["problem"], problem)
     issues += not_finite(raw)
     found = {}
@@ -227,6 +228,18 @@ def _fill_defaults(raw: dict[str, dict[str, Any]], problem: type[Problem]) -> No
         table, name = key.split(".", 1)
         if _IN_PLACE_OF.get(key) not in raw[table]:
             raw[table].setdefault(name, value)
-    for name, field in problem.model_fields.items():  # a table in part keeps the rest of it
-        if isinstance(field.default, Section) and isinstance(raw["problem"].get(name), dict):
-            raw["problem"][name] = {**field.default.model_dump(), **raw["problem"][name]}
+
+
+def _fill_tables(raw: dict[str, Any], source: Source, problem: type[Problem]) -> None:
+    """Put a table's default under members of it that --set gives alone, as in any other table.
+
+    A table that is given itself must be complete: half of a gas is not that of another tube.
+    """
+    for name, field in problem.model_fields.items():
+        path = ("problem", name)
+        whole = any(
+            place[:2] == path and (place == path or isinstance(where, int))
+            for place, where in source.places.items()
+        )
+        if isinstance(field.default, Section) and isinstance(raw.get(name), dict) and not whole:
+            raw[name] = {**field.default.model_dump(), **raw[name]}

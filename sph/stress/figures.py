@@ -1,6 +1,6 @@
 """Figures of a run that limits are set on, each by a name of parts between dots.
 
-errors.FIELD.NORM          as the summary has them: against the exact solution
+errors.FIELD.NORM          as the summary has them: against the exact solution, where it holds
 relative.FIELD.NORM        the same, of (value - exact)/|exact| of each particle
 report.NAME                figures of the problem
 conservation.NAME, cost.NAME, steps, particles, time
@@ -15,6 +15,7 @@ from pathlib import Path
 
 import numpy as np
 
+from sph.analysis import truth
 from sph.analysis.errors import norms
 from sph.output import checkpoint as checkpoints
 from sph.output.checkpoint import Checkpoint
@@ -86,8 +87,10 @@ class Figures:
     def _relative(self, field: str, norm: str):
         state, eos = self._last, self._last.config.physics.eos_model()
         problem, position = state.config.problem, state.particles.position
+        if truth.left_out(state.config, state.time, position):
+            return NONE
         exact = problem.exact(eos, state.time, position)[field]
-        inside, _ = problem.error_region(eos, state.time, position)
+        inside, _ = truth.region(problem, eos, state.time, position)
         with np.errstate(divide="ignore", invalid="ignore"):
             difference = (state.field(field) - exact) / np.abs(_length(exact))
         volume = state.particles.mass / state.particles.density

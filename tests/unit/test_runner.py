@@ -458,7 +458,7 @@ def test_an_old_summary_does_not_outlive_a_restart(tube, tmp_path):
     [
         (["problem.n=61"], "problem.n cannot be changed"),
         (["problem.dimension=2"], "problem.dimension cannot"),
-        (["problem.left={density=2.0}"], "problem.left cannot"),
+        (["problem.left={density=2.0,pressure=1.0}"], "problem.left cannot"),
         (["physics.alpha={min=0.1,max=2.0}"], "physics.alpha: expected one number"),
         (["time.end=0.1"], "time.end = 0.1: expected a later time than the checkpoint's, 0.2"),
         (["physics.aplha=2"], "alpha"),
@@ -820,7 +820,35 @@ def test_where_there_is_no_exact_solution_the_summary_says_so(uninterrupted):
     found = json.loads(uninterrupted.run.summary.read_text())
     none = found["problem"] == "kelvin_helmholtz"
     assert (found["errors"] is None) == none
-    assert ("Error: this problem has no exact solution here." in in_words(found)) == none
+    assert found["errors_left_out"] == ("this problem has no exact solution" if none else None)
+    words = "Error: left out, because this problem has no exact solution."
+    assert (words in in_words(found)) == none
+
+
+def test_errors_end_when_waves_have_met_the_walls_and_after_a_restart_too(tube, tmp_path):
+    longer = start(TUBE.replace("end = 0.2", "end = 0.3"), tmp_path / "longer")
+    again = go_on(copy(tube, tmp_path / "again").path, "time.end=0.3")
+    for run in (longer, again):
+        found = json.loads(run.summary.read_text())
+        # Sod's shock, at 1.75216, reaches x = 0.5
+        assert found["errors_left_out"] == (
+            "the exact solution ends at t = 0.2854, when the wave from the diaphragm reaches the "
+            "end at x = 0.5"
+        )
+        assert found["errors"] is None
+        assert not any(name.endswith("error") for name in found["report"])
+        assert f"Error: left out, because {found['errors_left_out']}." in in_words(found)
+    before = json.loads(tube.summary.read_text())
+    assert before["errors_left_out"] is None
+    assert "plateau_left_density_error" in before["report"]
+
+
+def test_errors_are_told_beside_the_size_of_the_field(tube):
+    found = json.loads(tube.summary.read_text())
+    density = found["errors"]["fields"]["density"]
+    share = density["L1"] / density["relative_L1"]  # the mean density by volume
+    assert 0.5 < share < 0.6  # 0.5625 of all
+    assert f"density {density['L1']:.3g} ({100 * density['relative_L1']:.2g} %)" in in_words(found)
 
 
 def test_momentum_is_judged_only_where_no_wall_takes_it(uninterrupted):

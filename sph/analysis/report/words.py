@@ -106,5 +106,7 @@ def _is_all_front(report: Report, line: Series) -> bool:
 
 def _reason(report: Report, row: Row) -> str:
     if row.status == "done":
-        return f"it has no {report.question.error_name}"
+        left_out = row.summary.get("errors_left_out")
+        why = f": {left_out}" if left_out and "." not in report.question.field else ""
+        return f"it has no {report.question.error_name}{why}"
     return ": ".join(filter(None, [row.status, row.reason.partition("\n")[0]]))

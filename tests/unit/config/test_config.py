@@ -67,10 +67,36 @@ def test_a_problem_default_gives_way_to_what_stands_in_its_place(monkeypatch):
     assert found.physics.eos_model().gamma == 2.0
 
 
-def test_a_table_of_the_problem_given_in_part_keeps_the_rest():
-    found = default("problem.left.density=5")
-    assert found.problem.left.density == 5.0
-    assert found.problem.left.pressure == default().problem.left.pressure
+def test_a_member_that_is_set_keeps_the_rest_of_its_table(tmp_path):
+    path = tmp_path / "minimal.toml"
+    path.write_text(MINIMAL)
+    for found in (default("problem.left.density=5"), config.load(path, ["problem.left.density=5"])):
+        assert found.problem.left.density == 5.0
+        assert found.problem.left.pressure == default().problem.left.pressure
+
+
+@pytest.mark.parametrize(
+    "table",
+    [
+        "right = { density = 1.0, velocity = 0.0 }",
+        "right.density = 1.0",
+        "[problem.right]\ndensity = 1.0",
+    ],
+)
+def test_a_table_in_the_file_must_be_complete(tmp_path, table):
+    path = tmp_path / "half.toml"
+    path.write_text(MINIMAL + table + "\n")
+    message = "problem.right.pressure is missing: expected a number greater than 0"
+    with pytest.raises(ConfigError, match=message):
+        config.load(path)
+    with pytest.raises(ConfigError, match=message):  # nor does setting another member fill it
+        config.load(path, ["problem.right.velocity=1"])
+    assert config.load(path, ["problem.right.pressure=0.2"]).problem.right.pressure == 0.2
+
+
+def test_a_table_that_is_set_must_be_complete():
+    with pytest.raises(ConfigError, match=r"problem\.right\.pressure is missing"):
+        default("problem.right={density=1.0}")
 
 
 def test_whole_numbers_become_the_floats_that_are_meant():
@@ -332,8 +358,8 @@ WRONG = {
         "line 4: time.zzz is not a key of [time]; there are end",
     ),
     "unknown key, deep": (
-        "left = { densty = 1 }",
-        "line 3: problem.left.densty is not a key of [problem.left]; did you mean density?",
+        "left = { density = 1, pressure = 1, velocty = 1 }",
+        "line 3: problem.left.velocty is not a key of [problem.left]; did you mean velocity?",
     ),
     "key of another table": (
         "alpha = 1",
