@@ -218,7 +218,7 @@ class Simulation:
     def _neighbours(self) -> passes.Neighbours:
         search = self.search
         return passes.Neighbours(
-            search.lists, search.domain.images, search.origin.support, search.reach_factor
+            search.lists, search.images, search.origin.support, search.reach_factor
         )
 
     def _gas(self) -> passes.Gas:

@@ -106,7 +106,8 @@ def at_points(state: Checkpoint, points: np.ndarray) -> dict[str, np.ndarray]:
     tree = cKDTree(points.T)
     low, high = points.min(axis=1), points.max(axis=1)
     sums = np.zeros((len(scalars) + particles.dimension + 1, points.shape[1]))
-    for sign, offset in zip(*Domain(problem.box, problem.boundaries).images, strict=True):
+    domain = Domain(problem.box, problem.boundaries)
+    for sign, offset in zip(*domain.images_within(H.max()), strict=True):
         image = sign[:, None] * particles.position + offset[:, None]
         values = np.vstack([scalars, sign[:, None] * fields["velocity"], np.ones_like(H)])
         reaches = (image + H > low[:, None]) & (image - H < high[:, None])
