@@ -6,6 +6,7 @@ report.NAME                figures of the problem
 conservation.NAME, cost.NAME, steps, particles, time
 history.COLUMN.KIND        over all steps; KIND is first, last, min or max
 state.FIELD.KIND           over the particles at the end; KIND is min or max
+warnings.KIND              how many warnings of that kind the run ended with
 change.FIELD               largest |last - first| of a particle, over its own first value for
                            scalars, over the largest first length for vectors
 """
@@ -15,6 +16,7 @@ from pathlib import Path
 
 import numpy as np
 
+from sph import warnings
 from sph.analysis import truth
 from sph.analysis.errors import norms
 from sph.output import checkpoint as checkpoints
@@ -24,7 +26,7 @@ from sph.output.run_directory import RunDirectory
 
 KINDS = (
     "errors", "relative", "report", "conservation", "cost", "steps", "particles", "time",
-    "history", "state", "change",
+    "history", "state", "change", "warnings",
 )  # fmt: skip
 NONE = float("nan")  # the value of a figure that a run does not have
 
@@ -44,7 +46,7 @@ class Figures:
         kind, *rest = name.split(".")
         makers = {
             "errors": self._error, "relative": self._relative, "history": self._of_history,
-            "state": self._of_state, "change": self._change,
+            "state": self._of_state, "change": self._change, "warnings": self._warnings,
         }  # fmt: skip
         try:
             return float(makers[kind](*rest) if kind in makers else self._said(kind, *rest))
@@ -68,6 +70,9 @@ class Figures:
         for name in names:
             found = found[name]
         return found
+
+    def _warnings(self, kind: str):
+        return warnings.kinds(self.summary).count(kind)
 
     def _error(self, field: str, norm: str):
         return self._said("errors", "fields", field, norm)
