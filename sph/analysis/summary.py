@@ -6,10 +6,14 @@ import sys
 import numpy as np
 
 from sph.analysis import errors
+from sph.config import restarts
 from sph.version import __version__
 
 
-def of_run(simulation, history: dict[str, np.ndarray], status: str, reason: str | None) -> dict:
+def of_run(
+    simulation, history: dict[str, np.ndarray], status: str, reason: str | None,
+    lineage: tuple[str, ...] = (),
+) -> dict:  # fmt: skip
     """The summary as a dictionary, from the simulation's last state and the whole history.
 
     status: "done", "stopped" or "failed", then with the reason. Errors are those against the exact
@@ -28,6 +32,8 @@ def of_run(simulation, history: dict[str, np.ndarray], status: str, reason: str 
         "particles": particles.number,
         "time": simulation.time,
         "steps": simulation.step,
+        "lineage": list(lineage),
+        "settings_changed": restarts.settings_changed(lineage),
         "errors": None,
         "report": None,
         "conservation": conservation(history, particles, eos, pressure, problem.boundaries),
@@ -113,6 +119,8 @@ def in_words(summary: dict) -> str:
         f"{summary['problem']}: {summary['particles']} particles to t = {summary['time']:.6g} "
         f"in {summary['steps']} steps ({summary['status']}).",
     ]
+    if summary["settings_changed"]:
+        lines.append(f"Settings changed on the way: {'; '.join(summary['settings_changed'])}.")
     if summary["errors"]:
         fields = ", ".join(
             f"{name.replace('_', ' ')} {norm['L1']:.3g}"

@@ -25,7 +25,12 @@ class Limit(NamedTuple):
 
 
 class Section(BaseModel):
-    """A table of the configuration: strict about types and unknown keys, immutable once read."""
+    """A table of the configuration: strict about types and unknown keys, immutable once read.
+
+    restart: the class of its keys in a restart (`sph.config.restarts`), unless a key has its own.
+    """
+
+    restart: ClassVar[str | None] = None
 
     model_config = ConfigDict(extra="forbid", strict=True, frozen=True, validate_default=True)
 
@@ -42,6 +47,7 @@ class Problem(Section):
       profiled   whether profiles over x, or that distance, show the solution; maps do else
     """
 
+    restart: ClassVar[str | None] = "refused"
     defaults: ClassVar[dict[str, Any]] = {}
     limits: ClassVar[dict[str, Limit]] = {}
     ideal_gas: ClassVar[bool] = False
