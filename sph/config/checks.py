@@ -30,6 +30,23 @@ def gas_issues(found: dict[str, Section]) -> list[Issue]:
     return [Issue(("physics", "eos"), text)]
 
 
+def external_issues(found: dict[str, Section]) -> list[Issue]:
+    """A field that cannot act in this box, and a conductivity that is none for its equilibrium."""
+    if not {"problem", "physics"} <= found.keys() or found["physics"].external is None:
+        return []
+    physics, issues = found["physics"], []
+    if misfit := physics.external_model().misfit(found["problem"].boundaries):
+        issues.append(Issue(("physics", "external"), f"= {value_text(physics.external)}: {misfit}"))
+    conductivity = physics.conductivity_model()
+    if conductivity is not None and not conductivity.suits_gravity:
+        text = (
+            f"= {value_text(physics.conductivity)}: expected none that acts where pressure varies "
+            'in equilibrium, as it does with physics.external. Try: "approach"'
+        )
+        issues.append(Issue(("physics", "conductivity"), text))
+    return issues
+
+
 def output_issues(found: dict[str, Section]) -> list[Issue]:
     """More checkpoints than anyone can want: a disk is soon full of them."""
     if not {"time", "output"} <= found.keys():
