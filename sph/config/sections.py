@@ -145,7 +145,7 @@ class Physics(Section):
     )
 
     max_energy_drift: float = Field(
-        0.02,
+        0.005,
         gt=0,
         description="the run stops where total energy is off by more than this part",
         json_schema_extra=FREE,
