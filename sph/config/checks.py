@@ -18,16 +18,20 @@ def both_given(raw: dict[str, dict[str, Any]]) -> list[Issue]:
 
 
 def gas_issues(found: dict[str, Section]) -> list[Issue]:
-    """A problem that is solved for an ideal gas, with another one."""
-    if not {"problem", "physics"} <= found.keys() or not found["problem"].ideal_gas:
+    """A problem that is solved for an ideal gas, or for gamma below a bound, with another gas."""
+    if not {"problem", "physics"} <= found.keys():
         return []
     from sph import eos
 
-    physics = found["physics"]
-    if eos.is_ideal(physics.eos_model()):
+    problem, physics = found["problem"], found["physics"]
+    gas, key = physics.eos_model(), "gamma" if physics.eos is None else "eos"
+    if problem.ideal_gas and not eos.is_ideal(gas):
+        text = f"expected an ideal gas for {problem.name}"
+    elif not getattr(gas, "gamma", 0.0) < problem.gamma_below:
+        text = f"expected gamma below {problem.gamma_below:g} for {problem.name}"
+    else:
         return []
-    text = f"= {value_text(physics.eos)}: expected an ideal gas for {found['problem'].name}"
-    return [Issue(("physics", "eos"), text)]
+    return [Issue(("physics", key), f"= {value_text(getattr(physics, key))}: {text}")]
 
 
 def external_issues(found: dict[str, Section]) -> list[Issue]:
@@ -45,6 +49,25 @@ def external_issues(found: dict[str, Section]) -> list[Issue]:
         )
         issues.append(Issue(("physics", "conductivity"), text))
     return issues
+
+
+def solution_misfit(problem: Problem, physics) -> str | None:
+    """What the exact solution leaves out, in words; None if nothing, or if there is no solution.
+
+    physics: the table [physics]. A problem is solved for the external field and the heating of its
+    own defaults, which are most often none.
+    """
+    if type(problem).exact is Problem.exact:
+        return None
+    own = {key: problem.defaults.get(f"physics.{key}") for key in ("external", "heating")}
+    solved = type(physics).model_validate(own)
+    keys = [f"physics.{key}" for key in own if getattr(physics, key) != getattr(solved, key)]
+    if not keys:
+        return None
+    return (
+        f"the exact solution of {problem.name} does not include {' and '.join(keys)} as set: "
+        "errors and figures of the report measure that difference as well"
+    )
 
 
 def output_issues(found: dict[str, Section]) -> list[Issue]:

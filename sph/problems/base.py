@@ -1,5 +1,6 @@
 """What every problem has: shared keys, and the questions the program asks of a problem."""
 
+import math
 from typing import Any, ClassVar, Literal, NamedTuple
 
 import numpy as np
@@ -82,6 +83,11 @@ class Problem(Section):
     def centre(self) -> np.ndarray:
         """(D,) the middle of the box."""
         return self.box.mean(axis=1)
+
+    @property
+    def gamma_below(self) -> float:
+        """What gamma must stay below for the problem to have its solution."""
+        return math.inf
 
     def initial(self, eos) -> InitialState:
         """The particles at t = 0 for that equation of state."""

@@ -3,6 +3,7 @@
 import pytest
 
 from sph import config, eos
+from sph.config import checks
 from sph.errors import ConfigError
 
 LIQUID = """
@@ -52,6 +53,20 @@ def test_problems_solved_for_an_ideal_gas_refuse_another(problem):
     assert read(0.0).physics.eos_model().gamma == 1.4
 
 
+@pytest.mark.parametrize("gas", ["gamma = 7.0", 'eos = { name = "ideal_gas", gamma = 7.5 }'])
+def test_a_blast_that_would_be_hollow_is_refused_before_the_run(gas):
+    """Its solution ends at gamma = 7 in 3-D, and a run would end in that error."""
+
+    def read(dimension, gas):
+        head = f'[problem]\nname = "point_explosion"\ndimension = {dimension}\n[physics]\n'
+        return config.from_text(head + gas, "a").physics
+
+    with pytest.raises(ConfigError, match=r"line 5: physics\..* expected gamma below 7 for point_"):
+        read(3, gas)
+    assert read(2, gas).eos_model().gamma >= 7.0
+    assert read(3, "gamma = 6.9").gamma == 6.9
+
+
 MASS = 'external = { name = "point_mass", mass = 1.0 }'
 
 
@@ -94,3 +109,26 @@ def test_conductivity_that_acts_in_equilibrium_goes_with_no_external_field(condu
     ) as e:
         config.from_text(text + MASS, "a")
     assert 'Try: "approach"' in str(e.value)
+
+
+HEATING = 'heating = { name = "relaxation", energy = 5.0, time = 0.1 }'
+
+
+@pytest.mark.parametrize(
+    ("problem", "keys", "words"),
+    [
+        ("shock_tube", "", None),
+        ("shock_tube", HEATING, "physics.heating as set"),
+        ("shock_tube", MASS, "physics.external as set"),
+        ("shock_tube", f"{MASS}\n{HEATING}", "physics.external and physics.heating as set"),
+        ("keplerian_ring", "", None),
+        ("keplerian_ring", MASS, None),
+        ("keplerian_ring", MASS.replace("1.0", "2.0"), "physics.external as set"),
+        ("particles", HEATING, None),  # it has no exact solution
+    ],
+)
+def test_what_an_exact_solution_leaves_out_is_told(problem, keys, words):
+    found = config.from_text(f'[problem]\nname = "{problem}"\n[physics]\n{keys}\n')
+    said = checks.solution_misfit(found.problem, found.physics)
+    assert (said is None) == (words is None)
+    assert words is None or f"of {problem} does not include {words}" in said
