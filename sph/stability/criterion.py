@@ -76,8 +76,11 @@ class Trial:
 class Judge:
     """Judges runs beside a reference run of the same particles."""
 
-    def __init__(self, reference: Path, criterion: Criterion):
-        """Raises NumericalError where the reference itself came to no end, FileError."""
+    def __init__(self, reference: Path, criterion: Criterion, holds_report: bool = True):
+        """Raises NumericalError where the reference itself came to no end, FileError.
+
+        holds_report: whether figures of the report must be the reference's where nothing is exact.
+        """
         self.directory = reference
         self.summary = read_summary(reference)
         if self.summary["status"] != "done":
@@ -90,7 +93,9 @@ class Judge:
         self.drift = self._largest_drift()
         self.errors = self._largest_errors()
         self.figures = self._largest_figures()
-        self.report = {} if self.has_exact else self._numbers(self.summary)
+        self.report = {}
+        if holds_report and not self.has_exact:
+            self.report = self._numbers(self.summary)
 
     @property
     def has_exact(self) -> bool:
@@ -130,9 +135,9 @@ class Judge:
                 f"C = {self._courant:g}"
             )
         else:
+            what = "fields and figures of the report" if self.report else "fields"
             errors = (
-                f"fields and figures of the report within {self.criterion.deviation:.0%} of the "
-                f"run at C = {self._courant:g}"
+                f"{what} within {self.criterion.deviation:.0%} of the run at C = {self._courant:g}"
             )
         figures = "".join(
             f", {name.replace('_', ' ')} at most {largest:.3g}"

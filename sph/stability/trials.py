@@ -36,7 +36,8 @@ class Trials:
         (task,) = self._run([self._point(COURANT, courant)])
         if task.status is None:
             raise NumericalError(f"the reference run fails: {self._refused[task.point.name]}")
-        self.judge = Judge(task.run.path, criterion)
+        # a mode of few particles grows otherwise at another eta, which is no instability
+        self.judge = Judge(task.run.path, criterion, holds_report=key == COURANT)
         if key == COURANT:
             self.done[courant] = self.judge.trial(courant, task.run.path)
 

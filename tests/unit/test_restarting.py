@@ -108,6 +108,17 @@ def test_a_run_killed_before_its_summary_gets_it(run):
     assert files(run.path / "checkpoints") == kept
 
 
+def test_only_the_last_checkpoint_stands_for_a_missing_summary(run):
+    """Of a run that was taken further, an earlier end is no reason to drop what came later."""
+    assert sph_("restart", run.path, "--set", "time.end=0.03").exit_code == 0
+    run.summary.unlink()
+    before = files(run.path)
+    result = sph_("restart", run.checkpoint_path(2))
+    assert result.exit_code == 0
+    assert END in result.stderr
+    assert files(run.path) == before
+
+
 def test_the_last_checkpoint_of_a_run_that_failed_later_closes_it_again(run):
     """An attempt to go on has failed: the summary is of that, and not of the last checkpoint."""
     far = ["--set", "time.end=0.1", "--set", "physics.max_energy_drift=1e-12"]

@@ -278,6 +278,7 @@ def test_without_an_exact_solution_figures_are_those_of_the_reference(tmp_path):
         trial = judge.trial(0.15, with_mode(name, value))
         assert trial.verdict == "beyond"
         assert trial.reason == f"mode is {float(value):.3g}, the reference's 0.02"
+    assert Trials(path, "physics.eta", (), tmp_path / "out", Criterion(), 1).judge.report == {}
 
 
 def test_a_shortened_search_says_what_it_did_not_run(tmp_path):
