@@ -1,14 +1,17 @@
 """Go on from a checkpoint: what may change, where it goes on, and that it does bit for bit."""
 
+import json
 from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 
+from sph import config as configuration
 from sph.analysis import reference
 from sph.clock import Clock
-from sph.config import Config
-from sph.errors import ConfigError, FileError
+from sph.config import Config, restarts
+from sph.config.restarts import Change
+from sph.errors import AtEnd, ConfigError, FileError, SphError
 from sph.neighbours.search import Origin
 from sph.output import checkpoint as checkpoints
 from sph.output.checkpoint import Checkpoint
@@ -16,7 +19,7 @@ from sph.output.files import copy_file
 from sph.output.history import History
 from sph.output.offenders import PART
 from sph.output.run_directory import RunDirectory, checkpoint_number, find
-from sph.runner import Runner, new_history, session, threads_of
+from sph.runner import Runner, new_history, output_times, session, threads_of
 from sph.scene import Scene
 from sph.simulation import Simulation
 
@@ -28,7 +31,7 @@ def restart(
 
     Later checkpoints are replaced. overrides: `a.b=VALUE`; directory: a new run directory, or None
     for the one that the checkpoint is in. Returns the summary and the run directory. Raises as
-    `run`, and FileError and ConfigError before anything is changed.
+    `run`, and FileError, ConfigError and AtEnd before anything is changed.
     """
     home, path = find(source)
     checkpoint = checkpoints.read(path)
@@ -38,10 +41,17 @@ def restart(
             "Try: the run's last good checkpoint, with other settings."
         )
     config = checkpoint.config.override(overrides)
-    _check_changes(config, checkpoint)
+    changed = restarts.changes(checkpoint.config, config)
+    _check_changes(changed, config, checkpoint)
+    in_place = directory is None or (
+        home is not None and directory.resolve() == home.path.resolve()
+    )
+    is_closed = not (in_place and _is_last_without_summary(home, path, checkpoint.time))
+    _check_steps_left(source, changed, config, checkpoint.time, is_closed)
     reference.check(config, directory or (home and home.path))
     if source.is_dir():
         _note_damaged(home, path, progress)
+        _note_other_settings(home, checkpoint.config, config, progress)
     target, number = _place_to_go_on(home, path, directory)
     with session(target) as (stopped_by, clock):
         target.write_config(config.to_toml())
@@ -53,7 +63,7 @@ def restart(
             history = History.resume(target.history, checkpoint.step)
         else:
             history = new_history(config, simulation, target)
-        lineage = f"restarted at step {checkpoint.step}, t = {checkpoint.time!r}"
+        lineage = restarts.lineage(checkpoint.step, checkpoint.time, changed)
         runner = Runner(config, target, simulation, history, progress, stopped_by)
         runner.number, runner.saved_step = number + 1, checkpoint.step
         runner.lineage = (*checkpoint.lineage, lineage)
@@ -80,27 +90,9 @@ def _coming_step(config: Config, checkpoint: Checkpoint) -> float:
     return step
 
 
-def _check_changes(config: Config, checkpoint: Checkpoint) -> None:
+def _check_changes(changed: list[Change], config: Config, checkpoint: Checkpoint) -> None:
     """Raise ConfigError where `config` wants what the particles of a checkpoint cannot give."""
-    before, after = checkpoint.config.problem.model_dump(), config.problem.model_dump()
-    wrong = [
-        f"problem.{key} cannot be changed in a restart: the particles are there already"
-        for key in after
-        if key not in before or after[key] != before[key]
-    ]
-    now, then = config.physics, checkpoint.config.physics
-    for key, changed in (
-        ("external", now.external != then.external),
-        ("heating", (now.heating is None) != (then.heating is None)),
-    ):
-        if changed:
-            wrong.append(
-                f"physics.{key}: expected as in the checkpoint, for the run's energy is measured "
-                "by what it began with"
-            )
-    if Scene(config).evolves_alpha != (checkpoint.particles.alpha is not None):
-        kind = "one number" if checkpoint.particles.alpha is None else "a range"
-        wrong.append(f"physics.alpha: expected {kind}, as in the checkpoint")
+    wrong = restarts.refusals(changed)
     if config.time.end < checkpoint.time:
         wrong.append(
             f"time.end = {config.time.end}: expected a later time than the checkpoint's, "
@@ -110,11 +102,57 @@ def _check_changes(config: Config, checkpoint: Checkpoint) -> None:
         raise ConfigError("\n".join(wrong))
 
 
+def _check_steps_left(
+    source: Path, changed: list[Change], config: Config, time: float, is_closed: bool
+) -> None:
+    """Raise ConfigError for settings that no step would be made with, AtEnd for a closed run."""
+    if any(output_times(config.time.end, config.output.interval, time)):
+        return
+    settings = [str(one) for one in changed if not one.key.startswith("run.")]
+    if settings:
+        raise ConfigError(
+            f"{source} is at its end, t = {time:g}: no step would be computed with "
+            f"{', '.join(settings)}.\nTry: a later time.end, or an earlier checkpoint."
+        )
+    if is_closed:
+        raise AtEnd(f"{source} is at its end, t = {time:g}: set a later time.end to go on.")
+
+
+def _is_last_without_summary(home: RunDirectory | None, path: Path, time: float) -> bool:
+    """Whether a run was killed after its last checkpoint, `path`, and before its summary."""
+    if home is None or checkpoint_number(path) != checkpoint_number(home.checkpoints()[-1]):
+        return False
+    try:
+        found = json.loads(home.summary.read_text(encoding="utf-8"))
+        return (found["status"], found["time"]) != ("done", time)
+    except (OSError, ValueError, LookupError, TypeError):
+        return True
+
+
+def _note_other_settings(home: RunDirectory, before: Config, config: Config, progress) -> None:
+    """Say where config.toml differs from the checkpoint and --set: nothing of it is used.
+
+    A user has edited it, or a restart with other settings was killed before its first checkpoint.
+    """
+    try:
+        written = configuration.load(home.config)
+    except SphError:
+        return
+    unused = set(map(str, restarts.changes(before, written)))
+    unused &= set(map(str, restarts.changes(config, written)))
+    for one in sorted(one for one in unused if not one.startswith("run.")):
+        progress.note(
+            f"{home.config} has {one.replace('(was', '(the checkpoint:', 1)}: going on with the "
+            "setting of the checkpoint; --set changes it"
+        )
+
+
 def _note_damaged(home: RunDirectory, good: Path, progress) -> None:
     """Say which checkpoints after the last good one were passed over."""
     for path in home.checkpoints():
         if checkpoint_number(path) > checkpoint_number(good):
-            progress.note(f"{path} cannot be read: going on from {good.name}")
+            why = "energy had drifted by then" if home.has_failed else "cannot be read"
+            progress.note(f"{path} is passed over ({why}): going on from {good.name}")
 
 
 def _place_to_go_on(

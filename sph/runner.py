@@ -266,6 +266,7 @@ class Runner:
             read_history(self.directory.history),
             status=status,
             reason=reason,
+            lineage=self.lineage,
         )
         self.directory.write_summary(result)
         named = self.config.report.reference

@@ -7,11 +7,15 @@ import numpy as np
 
 from sph import warnings
 from sph.analysis import errors, truth
+from sph.config import restarts
 from sph.totals import Baseline
 from sph.version import __version__
 
 
-def of_run(simulation, history: dict[str, np.ndarray], status: str, reason: str | None) -> dict:
+def of_run(
+    simulation, history: dict[str, np.ndarray], status: str, reason: str | None,
+    lineage: tuple[str, ...] = (),
+) -> dict:  # fmt: skip
     """The summary as a dictionary, from the simulation's last state and the whole history.
 
     status: "done", "stopped" or "failed", then with the reason. Errors are those against the exact
@@ -29,6 +33,8 @@ def of_run(simulation, history: dict[str, np.ndarray], status: str, reason: str 
         "particles": particles.number,
         "time": simulation.time,
         "steps": simulation.step,
+        "lineage": list(lineage),
+        "settings_changed": restarts.settings_changed(lineage),
         "errors": None,
         "errors_left_out": None,
         "report": None,
@@ -154,6 +160,7 @@ def in_words(summary: dict) -> str:
         f"{summary['problem']}: {summary['particles']} particles to t = {summary['time']:.6g} "
         f"in {summary['steps']} steps ({_ending(summary)}).",
         *(f"Warning: {one['text']}" for one in summary["warnings"]),
+        *_changes_in_words(summary),
         _errors_in_words(summary),
         *(
             f"  {name.replace('_', ' ')}: {value:.6g}"
@@ -169,6 +176,11 @@ def _ending(summary: dict) -> str:
     count = len(summary["warnings"])
     warned = f", with {count} warning{'s' * (count > 1)}" if count else ""
     return f"{summary['status']}{warned}"
+
+
+def _changes_in_words(summary: dict) -> list[str]:
+    changed = summary["settings_changed"]
+    return [f"Settings changed on the way: {'; '.join(changed)}."] if changed else []
 
 
 def _errors_in_words(summary: dict) -> str:

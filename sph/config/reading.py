@@ -148,6 +148,7 @@ def resolve(
             elsewhere = _tables_of_keys(models, besides=name)
             issues += explain(model, raw[name], details, name, elsewhere)
     issues += checks.gas_issues(found)
+    issues += checks.external_issues(found)
     issues += checks.output_issues(found)
     if issues:
         raise ConfigError("\n".join(_reports(source, issues)))

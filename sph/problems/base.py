@@ -34,7 +34,12 @@ class Limit(NamedTuple):
 
 
 class Section(BaseModel):
-    """A table of the configuration: strict about types and unknown keys, immutable once read."""
+    """A table of the configuration: strict about types and unknown keys, immutable once read.
+
+    restart: the class of its keys in a restart (`sph.config.restarts`), unless a key has its own.
+    """
+
+    restart: ClassVar[str | None] = None
 
     model_config = ConfigDict(extra="forbid", strict=True, frozen=True, validate_default=True)
 
@@ -53,6 +58,7 @@ class Problem(Section):
       profiled   whether profiles over x, or that distance, show the solution; maps do else
     """
 
+    restart: ClassVar[str | None] = "refused"
     defaults: ClassVar[dict[str, Any]] = {}
     limits: ClassVar[dict[str, Limit]] = {}
     ideal_gas: ClassVar[bool] = False
@@ -93,6 +99,11 @@ class Problem(Section):
     def allowed(self) -> dict[str, Limit]:
         """The limits that a run of this very configuration must keep, or its summary warns."""
         return self.limits
+
+    @property
+    def gamma_below(self) -> float:
+        """What gamma must stay below for the problem to have its solution."""
+        return math.inf
 
     def initial(self, eos) -> InitialState:
         """The particles at t = 0 for that equation of state."""

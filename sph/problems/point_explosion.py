@@ -1,5 +1,6 @@
 """Point explosion: energy released in the middle of cold gas (Sedov 1946; Taylor 1950)."""
 
+import math
 from typing import Annotated, ClassVar, Literal
 
 import numpy as np
@@ -66,6 +67,10 @@ class Problem(base.Problem):
     @classmethod
     def _exists(cls, kind, known):
         return placement.checked(kind, known.data.get("dimension"))
+
+    @property
+    def gamma_below(self) -> float:
+        return sedov.HOLLOW if self.dimension == 3 else math.inf
 
     def initial(self, eos) -> base.InitialState:
         """Particles of one mass at rest, cold but for the hot ones in the middle.

@@ -402,7 +402,7 @@ def test_a_lone_checkpoint(tube, tmp_path):
 def test_a_failed_run_goes_on_from_before_its_energy_drifted(tube, tmp_path):
     """What goes wrong is found some steps later: a checkpoint in between holds it already."""
     run = copy(tube, tmp_path / "run")
-    for number, drift in ((2, 1.9e-3), (3, -2.1e-3), (4, 0.019)):  # a tenth of 2 % is good enough
+    for number, drift in ((2, 4e-4), (3, -6e-4), (4, 4e-3)):  # a tenth of 0.5 % is good enough
         step = int(state(run.checkpoint_path(number))["step"])
         rewritten(run, step, "energy_drift", lambda _, drift=drift: drift)
     assert find(run.path)[1] == run.checkpoint_path(4)  # a run that is done, or was stopped
@@ -410,18 +410,6 @@ def test_a_failed_run_goes_on_from_before_its_energy_drifted(tube, tmp_path):
     assert find(run.path)[1] == run.checkpoint_path(2)
     run.checkpoint_path(2).write_bytes(b"damaged")
     assert find(run.path)[1] == run.checkpoint_path(1)
-
-
-def test_a_run_at_its_end_stays_as_it_is(tube, tmp_path):
-    run = copy(tube, tmp_path / "run")
-    run.summary.unlink()  # as after a kill between the last checkpoint and the summary
-    go_on(run.path)
-    assert numbers(run) == numbers(tube)
-    assert rows(run) == rows(tube)
-    assert json.loads(run.summary.read_text())["status"] == "done"
-    alone = go_on(shutil.copy(tube.checkpoint_path(4), tmp_path / "a.h5"), into=tmp_path / "b")
-    assert numbers(alone) == ["checkpoint_000000.h5"]
-    assert len(rows(alone)) == 1
 
 
 def test_a_damaged_last_checkpoint_is_passed_over_and_named(tube, tmp_path):
@@ -438,8 +426,8 @@ def test_a_damaged_last_checkpoint_is_passed_over_and_named(tube, tmp_path):
 def test_nothing_is_said_of_damage_where_there_is_none(tube, tmp_path):
     progress = Watch()
     run = copy(tube, tmp_path / "run")
-    go_on(run.path, progress=progress)
     go_on(run.checkpoint_path(2), progress=progress)
+    go_on(run.path, "time.end=0.21", progress=progress)
     assert not [note for note in progress.notes if "cannot be read" in note]
 
 
@@ -459,7 +447,8 @@ def test_an_old_summary_does_not_outlive_a_restart(tube, tmp_path):
         (["problem.n=61"], "problem.n cannot be changed"),
         (["problem.dimension=2"], "problem.dimension cannot"),
         (["problem.left={density=2.0,pressure=1.0}"], "problem.left cannot"),
-        (["physics.alpha={min=0.1,max=2.0}"], "physics.alpha: expected one number"),
+        (["physics.alpha={min=0.1,max=2.0}"], "physics.alpha = .*: expected one number"),
+        (["physics.gamma=1.6"], r"physics\.gamma cannot be changed"),
         (["time.end=0.1"], "time.end = 0.1: expected a later time than the checkpoint's, 0.2"),
         (["physics.aplha=2"], "alpha"),
         (["problem.n=61", "time.end=0.1"], r"(?s)problem\.n.*time\.end"),
