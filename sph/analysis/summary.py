@@ -5,7 +5,7 @@ import sys
 
 import numpy as np
 
-from sph.analysis import errors
+from sph.analysis import errors, pairing
 from sph.version import __version__
 
 
@@ -31,11 +31,13 @@ def of_run(simulation, history: dict[str, np.ndarray], status: str, reason: str 
         "errors": None,
         "report": None,
         "conservation": conservation(history, particles, eos, pressure, problem.boundaries),
+        "nearest": None,
         "cost": cost(simulation, history),
         "compiled_in": inside,
         "left_out": outside,
     }
     if status != "failed":
+        result["nearest"] = pairing.figures(simulation.nearest())
         if not scene.config.report.reference:
             exact = errors.against_exact(problem, eos, simulation.time, particles, pressure)
             result["errors"] = exact
