@@ -98,6 +98,9 @@ class Physics(Section):
     eta: float = Field(
         1.6, gt=0, description="smoothing length in units of the local particle spacing"
     )
+    allow_pairing: bool = Field(
+        False, description="run a spline kernel also at an eta at which its particles pair"
+    )
     max_support: float = Field(
         1.0,
         gt=0,
