@@ -9,7 +9,7 @@ from sph.integrators import leapfrog, step_size
 from sph.neighbours.order import number_of_blocks
 from sph.neighbours.search import Origin, Search
 from sph.particles import Particles
-from sph.passes import contacts, density, rates, shocks
+from sph.passes import contacts, density, nearest, rates, shocks
 from sph.scene import Scene
 from sph.threads import Team
 from sph.watchdog import Watchdog
@@ -172,6 +172,19 @@ class Simulation:
     def volume_ratio(self) -> float | None:
         """Sum of m/rho over the volume of the box, None where gas does not fill a closed box."""
         return self.totals.volume / self.scene.domain.volume if self.scene.is_filled else None
+
+    def nearest(self) -> np.ndarray:
+        """(N,) distance of each particle to its nearest neighbour, in particle spacings.
+
+        inf where no neighbour lies within the support.
+        """
+        p = self.particles
+        found = np.empty(p.number)
+        self.team.run(
+            nearest.nearest, self._wanted.size, self._dim, self._neighbours(), p.position,
+            p.support, p.mass, p.density, found,
+        )  # fmt: skip
+        return found
 
     def close(self) -> None:
         self.team.close()

@@ -39,6 +39,7 @@ def of_run(
         "errors_left_out": None,
         "report": None,
         "conservation": conservation(history, particles, scene),
+        "nearest": None,
         "cost": cost(simulation, history),
         "compiled_in": inside,
         "left_out": outside,
@@ -47,6 +48,10 @@ def of_run(
         result["errors_left_out"] = "the run failed"
     else:
         _judge(result, simulation, history)
+        nearest = simulation.nearest()
+        result["nearest"] = {
+            "median": float(np.median(nearest)), "smallest": float(nearest.min())
+        }  # fmt: skip
     warn(result, simulation)
     return result
 

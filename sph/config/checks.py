@@ -1,5 +1,6 @@
 """Checks across keys: what each key allows by itself, but not together."""
 
+import math
 from typing import Any
 
 from sph.config.errors import Issue
@@ -49,6 +50,22 @@ def external_issues(found: dict[str, Section]) -> list[Issue]:
         )
         issues.append(Issue(("physics", "conductivity"), text))
     return issues
+
+
+def pairing_issues(found: dict[str, Section]) -> list[Issue]:
+    """A kernel whose particles pair at this eta, unless the user allows pairing."""
+    if not {"problem", "physics"} <= found.keys() or found["physics"].allow_pairing:
+        return []
+    physics, dimension = found["physics"], found["problem"].dimension
+    limit = getattr(physics.kernel_model(), "pairs_above", {}).get(dimension, math.inf)
+    if physics.eta <= limit:
+        return []
+    text = (
+        f"= {value_text(physics.kernel)}: in {dimension}-D its particles pair where physics.eta "
+        f"is above {limit:g}, and it is {physics.eta:g}; take a smaller physics.eta or a Wendland "
+        "kernel, or set physics.allow_pairing = true"
+    )
+    return [Issue(("physics", "kernel"), text)]
 
 
 def output_issues(found: dict[str, Section]) -> list[Issue]:

@@ -121,9 +121,16 @@ def _set(source: Source, override: str) -> None:
 
 
 def resolve(
-    source: Source, overrides: Sequence[str], sections: dict[str, type[Section]]
+    source: Source,
+    overrides: Sequence[str],
+    sections: dict[str, type[Section]],
+    recorded: bool = False,
 ) -> dict[str, Section]:
-    """The valid tables by name. Raises ConfigError with one line for each thing wrong."""
+    """The valid tables by name. Raises ConfigError with one line for each thing wrong.
+
+    recorded: the source describes a run that exists, which stays readable where a new run with its
+    settings would be refused.
+    """
     for override in overrides:
         _set(source, override)
     models: dict[str, type[Section]] = {"problem": Problem, **sections}
@@ -148,7 +155,9 @@ def resolve(
             elsewhere = _tables_of_keys(models, besides=name)
             issues += explain(model, raw[name], details, name, elsewhere)
     issues += checks.gas_issues(found)
-    issues += checks.external_issues(found)
+    if not recorded:
+        issues += checks.external_issues(found)
+        issues += checks.pairing_issues(found)
     issues += checks.output_issues(found)
     if issues:
         raise ConfigError("\n".join(_reports(source, issues)))

@@ -114,6 +114,9 @@ class Physics(Section):
         description="smoothing length in units of the local particle spacing",
         json_schema_extra=RECORDED,
     )
+    allow_pairing: bool = Field(
+        False, description="run a spline kernel also at an eta at which its particles pair"
+    )
     max_support: float = Field(
         1.0,
         gt=0,

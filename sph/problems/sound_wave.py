@@ -68,7 +68,8 @@ class Problem(base.Problem):
     lattice: Literal["cubic", "hexagonal", "bcc", "relaxed"] = Field(
         default="cubic",
         description='"cubic", "hexagonal" (2-D), "bcc" (3-D) or "relaxed", a glass, whose noise '
-        "hides waves below some 1e-2",
+        "hides waves below some 1e-2; in 2-D lattices of the default kernel come apart above some "
+        '10,000 particles: take "hexagonal" with wendland_c4 at physics.eta = 2.2',
     )
 
     @field_validator("lattice")

@@ -3,6 +3,7 @@
 errors.FIELD.NORM          as the summary has them: against the exact solution, where it holds
 relative.FIELD.NORM        the same, of (value - exact)/|exact| of each particle
 report.NAME                figures of the problem
+nearest.KIND               distance to the nearest neighbour, in spacings; KIND is median, smallest
 conservation.NAME, cost.NAME, steps, particles, time
 history.COLUMN.KIND        over all steps; KIND is first, last, min or max
 state.FIELD.KIND           over the particles at the end; KIND is min or max
@@ -25,8 +26,8 @@ from sph.output.history import read as read_history
 from sph.output.run_directory import RunDirectory
 
 KINDS = (
-    "errors", "relative", "report", "conservation", "cost", "steps", "particles", "time",
-    "history", "state", "change", "warnings",
+    "errors", "relative", "report", "nearest", "conservation", "cost", "steps", "particles",
+    "time", "history", "state", "change", "warnings",
 )  # fmt: skip
 NONE = float("nan")  # the value of a figure that a run does not have
 

@@ -5,7 +5,7 @@ import pytest
 
 from sph.problems import base
 
-SHIPPED = ["sound_wave", "gresho", "yee", "noh", "shu_osher", "blast_waves"]
+SHIPPED = ["sound_wave", "sound_wave_2d", "gresho", "yee", "noh", "shu_osher", "blast_waves"]
 NUMBERS = np.array([32, 64, 128, 256])
 
 

@@ -840,6 +840,19 @@ def test_errors_are_told_beside_the_size_of_the_field(tube):
     assert f"density {density['L1']:.3g} ({100 * density['relative_L1']:.2g} %)" in in_words(found)
 
 
+def test_the_summary_says_how_near_to_each_other_particles_are(tube):
+    found = json.loads(tube.summary.read_text())["nearest"]
+    last = checkpoints.read(tube.checkpoint_path(4))
+    assert last.config.problem.boundaries == ("mirror",)
+    (low, high), p = last.config.problem.box[0], last.particles
+    order = np.argsort(p.position[0])
+    x = p.position[0, order]
+    gaps = np.diff([2 * low - x[0], *x, 2 * high - x[-1]])
+    nearest = np.minimum(gaps[1:], gaps[:-1]) * (p.density / p.mass)[order]
+    assert found["median"] == pytest.approx(np.median(nearest), rel=1e-10)
+    assert found["smallest"] == pytest.approx(nearest.min(), rel=1e-10)
+
+
 def test_momentum_is_judged_only_where_no_wall_takes_it(uninterrupted):
     found = json.loads(uninterrupted.run.summary.read_text())
     change = found["conservation"]["momentum_change"]

@@ -132,6 +132,45 @@ def test_models_of_tables():
     assert type(physics.eos_model().gamma) is float
 
 
+PAIRS = '[problem]\nname = "uniform"\n[physics]\nkernel = "cubic_spline"\n'
+
+
+@pytest.mark.parametrize(
+    ("kernel", "dimension", "eta", "limit"),
+    [("cubic_spline", 2, 1.41, "1.4"), ("cubic_spline", 3, 1.6, "1.2"),
+     ("quintic_spline", 2, 2.2, "1.8"), ("quintic_spline", 3, 1.7, "1.6")],
+)  # fmt: skip
+def test_a_kernel_is_refused_where_its_particles_pair(tmp_path, kernel, dimension, eta, limit):
+    path = tmp_path / "a.toml"
+    path.write_text(PAIRS)
+    keys = (f"physics.kernel={kernel}", f"problem.dimension={dimension}", f"physics.eta={eta}")
+    with pytest.raises(ConfigError, match=rf"physics\.kernel = .*{dimension}-D .* above {limit}"):
+        config.load(path, keys)
+    assert config.load(path, (*keys, "physics.allow_pairing=true")).physics.eta == eta
+    assert config.load(path, (*keys, f"physics.eta={limit}")).physics.eta == float(limit)
+    assert config.load(path, (*keys, "problem.dimension=1")).physics.eta == eta
+    for other in ("wendland_c2", "{name='cubic_spline', flattened=true}"):
+        assert config.load(path, (*keys, f"physics.kernel={other}")).physics.eta == eta
+
+
+def test_the_error_names_the_line_and_what_to_try(tmp_path):
+    path = tmp_path / "a.toml"
+    path.write_text(PAIRS)
+    with pytest.raises(ConfigError) as error:
+        config.load(path)
+    assert str(error.value).startswith(f"{path}, line 4: physics.kernel = ")
+    assert "physics.allow_pairing = true" in str(error.value)
+    assert "Wendland" in str(error.value)
+
+
+def test_a_run_that_exists_stays_readable_but_not_with_changes():
+    found = config.from_text(PAIRS)
+    assert found.physics.kernel == {"name": "cubic_spline", "flattened": False}
+    with pytest.raises(ConfigError, match="particles pair"):
+        found.override(["time.end=2"])
+    assert found.override(["time.end=2", "physics.allow_pairing=true"]).time.end == 2.0
+
+
 @pytest.mark.parametrize("value", ["1", "7", "converged"])
 def test_density_passes_are_a_count_or_a_word(value):
     assert str(default(f"physics.density_passes={value}").physics.density_passes) == value
