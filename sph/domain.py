@@ -65,8 +65,9 @@ class Domain:
 
     def _cells_within(self, reach: float) -> tuple[int, ...]:
         """How many copies of the box either way a reach covers, for each axis; at least 1."""
-        with np.errstate(over="ignore"):
-            return tuple(max(1, math.ceil(min(reach / (hi - lo), FAR))) for lo, hi in self.box)
+        with np.errstate(all="ignore"):
+            lengths = [reach / (hi - lo) for lo, hi in self.box]
+        return tuple(math.ceil(min(each, FAR)) if each > 1.0 else 1 for each in lengths)
 
     def _images(self, cells: tuple[int, ...]) -> Images:
         if cells not in self._kept:

@@ -155,8 +155,8 @@ def resolve(
             elsewhere = _tables_of_keys(models, besides=name)
             issues += explain(model, raw[name], details, name, elsewhere)
     issues += checks.gas_issues(found)
+    issues += checks.external_issues(found)
     if not recorded:
-        issues += checks.external_issues(found)
         issues += checks.pairing_issues(found)
     issues += checks.output_issues(found)
     if issues:

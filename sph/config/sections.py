@@ -115,7 +115,9 @@ class Physics(Section):
         json_schema_extra=RECORDED,
     )
     allow_pairing: bool = Field(
-        False, description="run a spline kernel also at an eta at which its particles pair"
+        False,
+        description="run a spline kernel also at an eta at which its particles pair",
+        json_schema_extra=RECORDED,
     )
     max_support: float = Field(
         1.0,

@@ -141,7 +141,7 @@ def test_a_run_directory_holds_what_is_promised(done):
     assert set(json.loads((run / "summary.json").read_text())) == {
         "status", "reason", "warnings", "version", "problem", "dimension", "particles", "time",
         "steps", "lineage", "settings_changed", "errors", "errors_left_out", "report",
-        "conservation", "cost", "compiled_in",
+        "conservation", "nearest", "cost", "compiled_in",
         "left_out",
     }  # fmt: skip
 
@@ -196,7 +196,10 @@ def test_restart_says_that_it_passes_over_a_damaged_checkpoint(done, tmp_path):
     os.truncate(last, 5000)
     result = sph_("restart", run)
     assert result.exit_code == 0
-    assert "checkpoint_000004.h5 cannot be read: going on from checkpoint_000003" in result.stderr
+    assert (
+        "checkpoint_000004.h5 is passed over (cannot be read): going on from checkpoint_000003"
+        in result.stderr
+    )
     assert hashes(run) == hashes(done[0])
 
 

@@ -136,6 +136,7 @@ n = 343
 noise = 0.2
 [physics]
 eta = 0.8
+max_energy_drift = 1.0
 [time]
 end = 10.0
 [output]
