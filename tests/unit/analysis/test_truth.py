@@ -8,6 +8,7 @@ import pytest
 
 from sph import config, registry
 from sph.analysis import errors, truth
+from sph.errors import ConfigError
 
 PROBLEMS = registry.names("sph.problems")
 # Until when the exact solution holds, worked out by hand, and a word of what ends it. Sod's shock
@@ -111,7 +112,12 @@ def test_what_is_steady_or_unknown_holds_for_ever(problem):
 )
 def test_no_exact_solution_has_a_field_or_heating(problem, other):
     small = () if problem == "particles" else ("problem.n=100",)
-    plain, departed = made(problem, *small), made(problem, *small, other)
+    plain = made(problem, *small)
+    if "point_mass" in other and "periodic" in plain.problem.boundaries:
+        with pytest.raises(ConfigError, match="expected no periodic axis"):
+            made(problem, *small, other)
+        return
+    departed = made(problem, *small, other)
     particles = at_start(plain)
     pressure, history = np.ones(particles.mass.size), {}
     name = other.partition("=")[0]
