@@ -1,0 +1,135 @@
+"""The closing words of a run, and what a summary has of one that was stopped or failed."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from sph.analysis import summary
+from sph.analysis.summary import in_words
+
+COST = {
+    "cpu_seconds": 80.0, "wall_seconds": 90.0, "threads": 2,
+    "session": {
+        "steps": 15, "updates": 1500, "updates_per_cpu_second": 1234567, "cpu_seconds": 3.0,
+        "wall_seconds": 2.0, "compile_cpu_seconds": 1.5,
+    },
+}  # fmt: skip
+KEPT = {
+    "energy_drift": 1e-9, "energy_drift_max": 2e-5, "energy_injected": 0.0,
+    "momentum_change": 3e-15, "volume_ratio": 0.98765, "volume_ratio_worst": 0.5,
+}  # fmt: skip
+ERRORS = {
+    "region": "x > 0",
+    "fields": {
+        "density": {"L1": 0.01, "relative_L1": 0.025},
+        "internal_energy": {"L1": 0.02, "relative_L1": None},
+    },
+}
+DONE = {
+    "status": "done", "problem": "uniform", "particles": 100, "time": 0.25, "steps": 20,
+    "warnings": [], "settings_changed": [], "errors": ERRORS, "errors_left_out": None,
+    "report": {"peak_density": 4.5}, "conservation": KEPT, "cost": COST,
+}  # fmt: skip
+
+
+def lines(**changed):
+    return in_words(DONE | changed).splitlines()
+
+
+def test_each_figure_is_told_with_its_name():
+    first, errors, figure, kept, cost = lines()
+    assert first == "uniform: 100 particles to t = 0.25 in 20 steps (done)."
+    assert "exact solution" in errors
+    assert errors.endswith("x > 0): density 0.01 (2.5 %), internal energy 0.02.")
+    assert figure == "  peak density: 4.5"
+    assert "energy to 2e-05;" in kept
+    assert "momentum to 3e-15;" in kept
+    assert kept.endswith("0.9877 of the volume.")
+    assert "2 s, 3 CPU s on 2 thread" in cost
+    assert "1.5 s compiling; 1,234,567 particle updates" in cost
+
+
+def test_what_was_not_kept_by_the_equations_alone_is_told():
+    def kept(**changed):
+        return lines(conservation=KEPT | changed)[3]
+
+    assert "(1.5e-05 of it to keep internal energies positive)" in kept(energy_injected=1.5e-5)
+    assert "positive" not in kept()
+    assert "momentum is not conserved" in kept(momentum_change=None)
+    assert "m/rho" not in kept(volume_ratio=None)
+
+
+@pytest.mark.parametrize(("count", "words"), [(1, "1 warning)"), (2, "2 warnings)")])
+def test_warnings_and_changed_settings_come_before_all_figures(count, words):
+    told = [{"kind": "limit", "text": f"text {i}"} for i in range(count)]
+    found = lines(warnings=told, settings_changed=["a = 1", "b = 2"])
+    assert found[0].endswith(f"(done, with {words}.")
+    assert found[1 : 1 + count] == [f"Warning: text {i}" for i in range(count)]
+    assert found[1 + count].endswith("a = 1; b = 2.")
+    assert found[2 + count].startswith("Error")
+
+
+def test_errors_against_a_run_name_it_and_errors_left_out_say_why():
+    assert "against the run fine/run" in lines(errors=ERRORS | {"reference": "fine/run"})[1]
+    assert "left out, because it is dark." in lines(errors=None, errors_left_out="it is dark")[1]
+
+
+@pytest.fixture
+def of_run(monkeypatch):
+    """of_run(status, reference): the summary of a simulation of which nothing is worked out."""
+    for name in ("conservation", "cost"):
+        monkeypatch.setattr(summary, name, lambda *_, name=name: name)
+    monkeypatch.setattr(summary.errors, "against_exact", lambda *_: "errors")
+    monkeypatch.setattr(summary.truth, "left_out", lambda *_: "why not")
+    monkeypatch.setattr(summary.truth, "figures", lambda *_: "figures")
+    monkeypatch.setattr(summary.warnings, "of_run", lambda *_: [summary.warnings.Warning("a", "b")])
+
+    def made(status, reference=None, lineage=()):
+        config = SimpleNamespace(
+            problem=SimpleNamespace(name="uniform"), report=SimpleNamespace(reference=reference),
+            time=SimpleNamespace(end=9.0),
+        )  # fmt: skip
+        particles = SimpleNamespace(number=3, position=None, pressure_by=lambda eos: None)
+        simulation = SimpleNamespace(
+            scene=SimpleNamespace(
+                config=config, dimension=2, eos=None, parts=lambda: (["i"], ["o"])
+            ),
+            particles=particles, time=0.25, step=20,
+            nearest=lambda: np.array([0.9, 1.1, 0.2]),
+        )  # fmt: skip
+        return summary.of_run(simulation, {}, status, "a reason", lineage)
+
+    return made
+
+
+def test_a_run_that_is_done_has_all_there_is(of_run):
+    lineage = (
+        "restarted at step 1, t = 0.125 with physics.alpha = 2.0 (was 1.0)",
+        "restarted at step 2, t = 0.25",
+    )
+    found = of_run("done", lineage=lineage)
+    assert found.pop("version")
+    assert found == {
+        "status": "done", "reason": "a reason", "warnings": [{"kind": "a", "text": "b"}],
+        "problem": "uniform", "dimension": 2, "particles": 3, "time": 0.25, "steps": 20,
+        "lineage": list(lineage),
+        "settings_changed": ["physics.alpha = 2.0 (was 1.0) at t = 0.125"],
+        "errors": "errors", "errors_left_out": "why not", "report": "figures",
+        "conservation": "conservation", "nearest": {"median": 0.9, "smallest": 0.2},
+        "cost": "cost", "compiled_in": ["i"], "left_out": ["o"],
+    }  # fmt: skip
+
+
+def test_a_run_that_failed_is_not_judged(of_run):
+    found = of_run("failed")
+    assert (found["errors"], found["report"], found["nearest"]) == (None, None, None)
+    assert "failed" in found["errors_left_out"]
+    assert found["warnings"]
+
+
+def test_errors_against_a_reference_are_left_to_the_end_of_the_run(of_run):
+    done, stopped = (of_run(status, reference="fine") for status in ("done", "stopped"))
+    assert (done["errors"], done["errors_left_out"]) == (None, None)
+    assert (stopped["errors"], done["report"], stopped["report"]) == (None, "figures", "figures")
+    assert "stopped before" in stopped["errors_left_out"]
