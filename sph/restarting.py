@@ -1,5 +1,6 @@
 """Go on from a checkpoint: what may change, where it goes on, and that it does bit for bit."""
 
+import dataclasses
 import json
 from collections.abc import Sequence
 from pathlib import Path
@@ -54,27 +55,45 @@ def restart(
         _note_other_settings(home, checkpoint.config, config, progress)
     target, number = _place_to_go_on(home, path, directory)
     with session(target) as (stopped_by, clock):
-        target.write_config(config.to_toml())
-        simulation = _resumed(config, checkpoint, clock)
-        target.drop_checkpoints_after(number)
-        for old in (target.summary, target.offenders):  # a run that is killed must not keep them
-            old.unlink(missing_ok=True)
+        lineage = (
+            *checkpoint.lineage,
+            restarts.lineage(checkpoint.step, checkpoint.time, changed),
+        )
+        next_step = _coming_step(config, checkpoint)
+        begun = dataclasses.replace(checkpoint, config=config, lineage=lineage, next_step=next_step)
+        _begin_anew(target, number, begun, any(not one.key.startswith("run.") for one in changed))
+        simulation = _resumed(begun, clock)
         if target.history.exists():
             history = History.resume(target.history, checkpoint.step)
         else:
             history = new_history(config, simulation, target)
-        lineage = restarts.lineage(checkpoint.step, checkpoint.time, changed)
         runner = Runner(config, target, simulation, history, progress, stopped_by)
         runner.number, runner.saved_step = number + 1, checkpoint.step
-        runner.lineage = (*checkpoint.lineage, lineage)
+        runner.lineage = lineage
         return runner.from_checkpoint(), target
 
 
-def _resumed(config: Config, checkpoint: Checkpoint, clock: Clock) -> Simulation:
+def _begin_anew(target: RunDirectory, number: int, begun: Checkpoint, is_changed: bool) -> None:
+    """Make the directory say what goes on from checkpoint `number`, at every moment one truth.
+
+    What a later state left goes first. Then the settings go into the checkpoint itself, from which
+    every restart takes them: one that is stopped before its first step would lose them else.
+    config.toml, which nobody goes on from, is last.
+    """
+    for old in (target.summary, target.offenders):
+        old.unlink(missing_ok=True)
+    target.drop_checkpoints_after(number)
+    if is_changed:
+        checkpoints.write(target.checkpoint_path(number), begun)
+    target.write_config(begun.config.to_toml())
+
+
+def _resumed(checkpoint: Checkpoint, clock: Clock) -> Simulation:
+    config = checkpoint.config
     origin = Origin(checkpoint.list_position, checkpoint.list_support, checkpoint.list_skin)
     return Simulation.resume(
         Scene(config), checkpoint.particles, checkpoint.time, checkpoint.step,
-        _coming_step(config, checkpoint), origin, threads_of(config), clock,
+        checkpoint.next_step, origin, threads_of(config), clock,
     )  # fmt: skip
 
 
