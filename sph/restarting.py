@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
+from sph import fingerprint
 from sph.analysis import reference
 from sph.clock import Clock
 from sph.config import Config
@@ -43,7 +44,9 @@ def restart(
     if source.is_dir():
         _note_damaged(home, path, progress)
     target, number = _place_to_go_on(home, path, directory)
-    with session(target) as (stopped_by, clock):
+    if reason := fingerprint.differences(checkpoint.computed_by):
+        progress.note(reason)
+    with session(target, config, progress) as (stopped_by, clock):
         target.write_config(config.to_toml())
         simulation = _resumed(config, checkpoint, clock)
         target.drop_checkpoints_after(number)
