@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from sph import config as configuration
+from sph import fingerprint
 from sph.analysis import reference
 from sph.clock import Clock
 from sph.config import Config, restarts
@@ -54,7 +55,9 @@ def restart(
         _note_damaged(home, path, progress)
         _note_other_settings(home, checkpoint.config, config, progress)
     target, number = _place_to_go_on(home, path, directory)
-    with session(target) as (stopped_by, clock):
+    if reason := fingerprint.differences(checkpoint.computed_by):
+        progress.note(reason)
+    with session(target, config, progress) as (stopped_by, clock):
         lineage = (
             *checkpoint.lineage,
             restarts.lineage(checkpoint.step, checkpoint.time, changed),

@@ -18,6 +18,7 @@ import h5py
 import numpy as np
 
 from sph import config as configuration
+from sph import fingerprint
 from sph.errors import ConfigError, FileError
 from sph.output import layout
 from sph.output.files import PatientFile, replacing
@@ -50,6 +51,7 @@ class Checkpoint:
     list_skin: float  # their skin, as a fraction of H
     config: configuration.Config
     lineage: tuple[str, ...]  # the runs it came from, oldest first
+    computed_by: str | None = None  # of one that was read: `fingerprint.as_json` of its writer
 
     @property
     def pressure(self) -> np.ndarray:
@@ -95,7 +97,9 @@ def read(path: Path) -> Checkpoint:
             attributes = dict(group.attrs)
             _check_hashes(state, attributes)
             config = _config(path, attributes["configuration"])
-            return _checkpoint(state, config, tuple(json.loads(attributes["lineage"])))
+            found = _checkpoint(state, config, tuple(json.loads(attributes["lineage"])))
+            found.computed_by = attributes.get("computed_by")
+            return found
         except DAMAGE as error:
             raise FileError(f"{path} is damaged ({error}).\n{START_ELSEWHERE}") from error
 
@@ -128,6 +132,7 @@ def _write_private(group: h5py.Group, checkpoint: Checkpoint) -> None:
             "configuration_sha256": _text_hash(text),
             "machine": f"{platform.machine()} {sys.byteorder}-endian",
             "versions": _versions(),
+            "computed_by": fingerprint.as_json(),
         }
     )
 
