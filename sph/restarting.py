@@ -14,6 +14,7 @@ from sph.clock import Clock
 from sph.config import Config, restarts
 from sph.config.restarts import Change
 from sph.errors import AtEnd, ConfigError, FileError, SphError
+from sph.integrators import step_size
 from sph.neighbours.search import Origin
 from sph.output import checkpoint as checkpoints
 from sph.output.checkpoint import Checkpoint
@@ -103,12 +104,17 @@ def _resumed(checkpoint: Checkpoint, clock: Clock) -> Simulation:
 def _coming_step(config: Config, checkpoint: Checkpoint) -> float:
     """The checkpoint's next step, or what becomes of it under other limits (eq 32)."""
     now, before, p = config.physics, checkpoint.config.physics, checkpoint.particles
-    step = checkpoint.next_step * (now.C / before.C)  # unchanged where C is: bit for bit
+    scene = Scene(config)
+    held, held_before = (s.step_bounds.held[0] for s in (scene, Scene(checkpoint.config)))
+    step = checkpoint.next_step * (held / held_before)  # unchanged where both are: bit for bit
+    if step > checkpoint.next_step:
+        limit = step_size.StepLimit(step, 0, "checkpoint")
+        step = step_size.before_contact(limit, scene.step_bounds, p, scene.domain).dt
     if now.energy_limit and not before.energy_limit:
         warm = p.internal_energy > 0.0  # as for every step: what has no energy sets none
         with np.errstate(divide="ignore"):
             times = p.internal_energy[warm] / np.abs(p.energy_rate[warm])
-        step = min(step, float(now.C * np.min(times, initial=np.inf)))
+        step = min(step, float(held * np.min(times, initial=np.inf)))
     return step
 
 

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from sph import faults
 from sph.analysis import reference, summary
 from sph.clock import Clock
 from sph.config import Config
@@ -188,6 +189,8 @@ class Runner:
     def _to_end(self) -> dict:
         simulation, end = self.simulation, self.config.time.end
         times = output_times(end, self.config.output.interval, simulation.time)
+        if held := faults.held_courant(simulation.scene):
+            self.progress.note(held)
         self.progress.start(simulation.time, end)
         try:
             for output in times:

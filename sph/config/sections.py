@@ -129,7 +129,8 @@ class Physics(Section):
     C: float = Field(
         0.15,
         gt=0,
-        description="Courant number: the time step in units of the stable one",
+        description="Courant number: the time step in units of support over signal speed; held "
+        "where the leapfrog is stable with physics.alpha and physics.conductivity",
         json_schema_extra=RECORDED,
     )
     balsara: bool = Field(
