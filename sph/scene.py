@@ -79,10 +79,10 @@ class Scene:
         free = [kind != "mirror" and self.external is None for kind in self.domain.boundaries]
         return np.array(free, dtype=float)
 
-    @property
+    @cached_property
     def is_filled(self) -> bool:
         """Whether gas fills a box without open sides, so that sum m/rho is to be its volume."""
-        return self.config.problem.fills_box and "open" not in self.domain.boundaries
+        return self.config.problem.fills_box(self.eos) and "open" not in self.domain.boundaries
 
     @property
     def max_support(self) -> float:

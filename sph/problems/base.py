@@ -53,7 +53,6 @@ class Problem(Section):
                  configuration must keep, each with the reason for the number
       ideal_gas  whether its solution is that of an ideal gas, so that others are refused
       radial     whether, in 2-D and 3-D, the solution depends on the distance from `centre` alone
-      fills_box  whether the gas fills the box, so that in a closed one sum m/rho is its volume
       swamped    figures beyond whose bound the problem's small signal is lost in numerical noise
       profiled   whether profiles over x, or that distance, show the solution; maps do else
     """
@@ -63,7 +62,6 @@ class Problem(Section):
     limits: ClassVar[dict[str, Limit]] = {}
     ideal_gas: ClassVar[bool] = False
     radial: ClassVar[bool] = False
-    fills_box: ClassVar[bool] = True
     swamped: ClassVar[dict[str, Limit]] = {}
     profiled: ClassVar[bool] = True
 
@@ -95,6 +93,10 @@ class Problem(Section):
     def centre(self) -> np.ndarray:
         """(D,) the middle of the box."""
         return self.box.mean(axis=1)
+
+    def fills_box(self, eos) -> bool:
+        """Whether gas fills the box at all times: in a closed one, sum m/rho is then its volume."""
+        return True
 
     def allowed(self) -> dict[str, Limit]:
         """The limits that a run of this very configuration must keep, or its summary warns."""

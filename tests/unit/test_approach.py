@@ -104,6 +104,9 @@ class Placed(uniform.Problem):
     speeds: list
     energies: list
 
+    def fills_box(self, eos):
+        return False
+
     def initial(self, eos):
         x = np.array(self.places, dtype=float)
         each = np.full(x.shape[1], 1.0 / x.shape[1])
