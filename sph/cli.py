@@ -5,8 +5,9 @@ from pathlib import Path
 
 import click
 
-from sph import cli_studies
+from sph import cli_studies, standard_streams
 from sph.errors import ConfigError, NumericalError, SphError
+from sph.shell_words import quoted
 from sph.version import __version__
 
 OVERRIDES = click.option(
@@ -23,6 +24,10 @@ STRICT = click.option(
 
 class Program(click.Group):
     """Shows the program's own errors as their message and exits with their code."""
+
+    def main(self, *arguments, **settings):
+        standard_streams.secure()
+        return super().main(*arguments, **settings)
 
     def invoke(self, context):
         try:
@@ -62,7 +67,7 @@ def run(config, overrides, directory, threads, dry_run, force, strict):
     if dry_run:
         from sph import preview
 
-        click.echo(preview.describe(resolved))
+        standard_streams.deliver(preview.describe(resolved) + "\n")
         return
     from sph import progress, runner
     from sph.output.run_directory import RunDirectory
@@ -112,7 +117,7 @@ def new(problem, target):
 
     text = configuration.template(problem)
     if target is None:
-        click.echo(text, nl=False)
+        standard_streams.deliver(text)
         return
     from sph.output.files import write_new
 
@@ -145,7 +150,7 @@ def _tell(result, target, strict):
     from sph.analysis import summary
 
     click.echo(summary.in_words(result))
-    click.echo(f"Results: {target.path} (`sph plot {target.path}` draws them).")
+    click.echo(f"Results: {target.path} (`sph plot {quoted(target.path)}` draws them).")
     if kinds := warnings.kinds(result):
         said = f"{target.path} ended with warnings: {', '.join(kinds)} (see docs/warnings.md)"
         if strict:

@@ -5,6 +5,7 @@ from pathlib import Path
 import click
 
 from sph.errors import NumericalError
+from sph.shell_words import quoted
 
 
 @click.command()

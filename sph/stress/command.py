@@ -4,11 +4,11 @@ Each case is a sweep in a directory of its own, whose points are the case's sett
 pool of processes, and what is done is not done again.
 """
 
-import sys
 import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 
+from sph import standard_streams
 from sph.errors import Stopped
 from sph.output.files import explained, write_text
 from sph.stress import table
@@ -86,7 +86,7 @@ class _Told:
         self._say(f"[{self.ended:{len(str(self.all))}d}/{self.all}] {outcome.name}: {verdict}")
 
     def _say(self, line: str) -> None:
-        print(line, file=sys.stderr, flush=True)
+        standard_streams.note(line)
 
 
 def _point(case: Case, setting: str) -> Point:
