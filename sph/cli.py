@@ -6,7 +6,7 @@ from pathlib import Path
 import click
 
 from sph import cli_studies, standard_streams
-from sph.errors import ConfigError, NumericalError, SphError
+from sph.errors import ConfigError, FileError, NumericalError, SphError
 from sph.shell_words import quoted
 from sph.version import __version__
 
@@ -35,6 +35,10 @@ class Program(click.Group):
         except SphError as error:
             click.echo(f"sph: {error}", err=True)
             sys.exit(error.exit_code)
+        except OSError as error:  # such as a name that is too long, wherever it was looked at
+            where = "" if error.filename is None else f"{error.filename}: "
+            click.echo(f"sph: {where}{error.strerror or error}.", err=True)
+            sys.exit(FileError.exit_code)
         except MemoryError as error:
             click.echo(f"sph: out of memory: {error}\nTry: a smaller problem.n.", err=True)
             sys.exit(ConfigError.exit_code)
