@@ -12,9 +12,10 @@ from pathlib import Path
 
 import click
 
-from sph import cli_studies
+from sph import cli_studies, standard_streams
 from sph.docstrings import docstring
-from sph.errors import ConfigError, NumericalError, SphError
+from sph.errors import ConfigError, FileError, NumericalError, SphError
+from sph.shell_words import quoted
 from sph.version import __version__
 
 OVERRIDES = click.option(
@@ -32,12 +33,20 @@ STRICT = click.option(
 class Program(click.Group):
     """Shows the program's own errors as their message and exits with their code."""
 
+    def main(self, *arguments, **settings):
+        standard_streams.secure()
+        return super().main(*arguments, **settings)
+
     def invoke(self, context):
         try:
             return super().invoke(context)
         except SphError as error:
             click.echo(f"sph: {error}", err=True)
             sys.exit(error.exit_code)
+        except OSError as error:  # such as a name that is too long, wherever it was looked at
+            where = "" if error.filename is None else f"{error.filename}: "
+            click.echo(f"sph: {where}{error.strerror or error}.", err=True)
+            sys.exit(FileError.exit_code)
         except MemoryError as error:
             click.echo(f"sph: out of memory: {error}\nTry: a smaller problem.n.", err=True)
             sys.exit(ConfigError.exit_code)
@@ -73,7 +82,7 @@ def run(config, overrides, directory, threads, dry_run, force, strict):
     if dry_run:
         from sph import preview
 
-        click.echo(preview.describe(resolved))
+        standard_streams.deliver(preview.describe(resolved) + "\n")
         return
     from sph import progress, runner
     from sph.output.run_directory import RunDirectory
@@ -123,7 +132,7 @@ def new(problem, target):
 
     text = configuration.template(problem)
     if target is None:
-        click.echo(text, nl=False)
+        standard_streams.deliver(text)
         return
     from sph.output.files import write_new
 
@@ -156,7 +165,7 @@ def _tell(result, target, strict):
     from sph.analysis import summary
 
     click.echo(summary.in_words(result))
-    click.echo(f"Results: {target.path} (`sph plot {target.path}` draws them).")
+    click.echo(f"Results: {target.path} (`sph plot {quoted(target.path)}` draws them).")
     if kinds := warnings.kinds(result):
         said = f"{target.path} ended with warnings: {', '.join(kinds)} (see docs/warnings.md)"
         if strict:

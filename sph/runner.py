@@ -21,6 +21,7 @@ from sph.output.history import History
 from sph.output.history import read as read_history
 from sph.output.run_directory import RunDirectory
 from sph.scene import Scene
+from sph.shell_words import quoted
 from sph.simulation import Simulation
 from sph.stop_signals import stop_signals
 from sph.threads import available_processors
@@ -212,7 +213,7 @@ class Runner:
         words = offenders.leave(self.directory.offenders, self._checkpoint(), error.particle)
         return NumericalError(
             f"{error}\n{words}The last good checkpoint is {last}: "
-            f"`sph restart {last} --set …` goes on from there with other settings.",
+            f"`sph restart {quoted(last)} --set …` goes on from there with other settings.",
             error.particle,
         )
 
@@ -224,7 +225,7 @@ class Runner:
         raise Stopped(
             f"stopped by {name} at t = {simulation.time:.6g}, step {simulation.step}, with "
             f"{self.directory.checkpoint_path(self.number - 1)}.\n"
-            f"`sph restart {self.directory.path}` goes on from there."
+            f"`sph restart {quoted(self.directory.path)}` goes on from there."
         )
 
     def _record(self) -> None:

@@ -227,7 +227,14 @@ class Output(Section):
 
 
 def _absolute(path: str) -> str:
-    return path and os.path.abspath(path)
+    found = path and os.path.abspath(path)
+    try:
+        found.encode()  # else a configuration, which is UTF-8, could not hold it
+    except UnicodeEncodeError:
+        raise ValueError(f"{found!a}: expected a path that is UTF-8 text") from None
+    if "\0" in found:
+        raise ValueError(f"{found!r}: expected a path, which holds no NUL")
+    return found
 
 
 class Report(Section):

@@ -23,6 +23,7 @@ from sph.errors import ConfigError, FileError
 from sph.output import layout
 from sph.output.files import PatientFile, replacing
 from sph.particles import Particles
+from sph.shell_words import quoted
 from sph.version import __version__
 
 # To be raised with every change of what the datasets of /Checkpoint mean.
@@ -153,7 +154,7 @@ def _refuse_what_is_not_hdf5(path: Path) -> None:
             beginning = file.read(len(HDF5_SIGNATURE))
     except FileNotFoundError:
         raise FileError(
-            f"there is no checkpoint {path}.\nTry: `ls {path.parent}` for those there are."
+            f"there is no checkpoint {path}.\nTry: `ls {quoted(path.parent)}` for those there are."
         ) from None
     except OSError as error:
         raise FileError(

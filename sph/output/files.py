@@ -36,7 +36,8 @@ def replacing(path: Path) -> Iterator[Path]:
 def write_text(path: Path, text: str) -> None:
     """Write `text` (UTF-8) to `path`, all or nothing. Raises FileError."""
     with replacing(path) as unfinished:
-        unfinished.write_text(text, encoding="utf-8")
+        # a path that is not UTF-8 holds lone surrogates, whose Python escape is that of JSON too
+        unfinished.write_text(text, encoding="utf-8", errors="backslashreplace")
 
 
 def is_unfinished(name: str) -> bool:

@@ -16,6 +16,7 @@ from sph.errors import FileError
 from sph.output import checkpoint, history
 from sph.output.files import explained, is_unfinished, remove_unfinished, write_text
 from sph.output.json_text import json_text
+from sph.shell_words import quoted
 
 CHECKPOINT_NAME = re.compile(r"checkpoint_(\d{6,})\.h5")
 
@@ -188,7 +189,7 @@ class RunDirectory:
         if begun and not force:
             raise FileError(
                 f"{self.path} holds a run already.\nTry: --force to replace it, "
-                f"`sph restart {self.path}` to go on with it, or another directory with -o."
+                f"`sph restart {quoted(self.path)}` to go on with it, or another directory with -o."
             )
         for tree in (self.figures, self.diagnostics):
             if tree.is_dir() and not tree.is_symlink():

@@ -51,11 +51,12 @@ class SweepDirectory:
         """The plan in sweep.toml. Raises FileError where there is none that can be read."""
         try:
             found = tomllib.loads(self.manifest.read_text(encoding="utf-8"))
-            points = tuple(Point(name, tuple(found["points"][name])) for name in found["points"])
-            return Plan(tuple(found["set"]), found["vary"], points)
+            points = tuple(Point(name, _texts(one)) for name, one in found["points"].items())
+            varied = {key: list(_texts(values)) for key, values in found["vary"].items()}
+            return Plan(_texts(found["set"]), varied, points)
         except OSError as error:
             raise FileError(f"{self.manifest} cannot be read: {error.strerror}") from None
-        except (ValueError, KeyError, TypeError, AttributeError):
+        except (ValueError, KeyError, TypeError, AttributeError, RecursionError):
             raise FileError(
                 f"{self.manifest} is not the manifest of a sweep.\n{OTHER_DIRECTORY}"
             ) from None
@@ -81,7 +82,7 @@ class SweepDirectory:
     def failures(self) -> dict[str, str]:
         """Reasons of points whose last attempt failed, by name."""
         found = sorted(self.logs.glob("*.failed"))
-        return {path.stem: path.read_text(encoding="utf-8").strip() for path in found}
+        return {path.stem: reason_in(path) for path in found}
 
     def _extended(self, plan: Plan, resolved: dict[str, Config]) -> Plan:
         """The plan that is here and what the new one adds. Raises ConfigError if they differ."""
@@ -117,6 +118,14 @@ class SweepDirectory:
             )
 
 
+def reason_in(path: Path) -> str:
+    """What a `.failed` file says, whatever it holds."""
+    try:
+        return path.read_text(encoding="utf-8", errors="replace").strip() or "no reason was kept"
+    except OSError as error:
+        return f"the reason cannot be read: {error.strerror}"
+
+
 def has_checkpoints(run: RunDirectory) -> bool:
     """Whether there is a run directory with a checkpoint, good or not."""
     try:
@@ -143,6 +152,13 @@ def _differences(there: Config, now: Config) -> list[str]:
         for key in before[table] | after[table]
         if before[table].get(key) != after[table].get(key)
     ]
+
+
+def _texts(values) -> tuple[str, ...]:
+    """A list of texts. Raises TypeError for anything else."""
+    if not isinstance(values, list) or not all(isinstance(one, str) for one in values):
+        raise TypeError
+    return tuple(values)
 
 
 def _text(plan: Plan) -> str:

@@ -367,6 +367,11 @@ def test_missing_files(tmp_path):
     assert_told(sph_("restart", tmp_path), 4, "is not a run directory")
 
 
+@pytest.mark.parametrize("command", ["restart", "plot", "report"])
+def test_a_name_that_the_file_system_refuses(command):
+    assert_told(sph_(command, "x" * 300), 4, "x" * 300, "File name too long")
+
+
 def test_what_is_no_good_checkpoint(done, tmp_path):
     good = (done[0] / "checkpoints" / "checkpoint_000002.h5").read_bytes()
     bad = tmp_path / "bad.h5"

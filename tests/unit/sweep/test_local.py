@@ -13,6 +13,7 @@ import pytest
 from conftest import attempts, runs, until
 
 from sph.output.history import read as read_history
+from sph.sweep import command
 from sph.sweep.local import available_processors
 from sph.sweep.manifest import SweepDirectory
 from sph.sweep.plan import Plan
@@ -196,3 +197,34 @@ def test_the_last_lines_of_a_run_without_a_message_are_the_reason(program, monke
 
 def test_processors():
     assert 1 <= available_processors() <= os.cpu_count()
+
+
+def test_a_sweep_says_how_many_points_it_has_and_above_a_bound_asks(program, tmp_path, monkeypatch):
+    ran = []
+    monkeypatch.setattr(command.local, "run", lambda tasks, jobs, tell: ran.append(len(tasks)))
+    monkeypatch.setattr(command, "ASKED_ABOVE", 2)
+    arguments = ("--vary", "problem.n=40,50,60", "-o", tmp_path / "sweep")
+    result = program.run(*arguments)
+    assert result.exit_code == 2
+    assert "these are 3 points" in result.stderr
+    assert "--yes" in result.stderr
+    assert not (tmp_path / "sweep").exists()
+    result = program.run(*arguments, "--yes")
+    assert result.exit_code == 0
+    assert "3 points to check and run" in result.stderr
+    assert ran == [3]
+
+
+def test_what_the_file_system_refuses_for_a_point_is_its_reason(program, tmp_path):
+    path = tmp_path / "a path/sweep"
+    (path.parent).mkdir()
+    result = program.run("--vary", "problem.n=40", "-o", path)
+    assert f"(`sph report '{path}'` compares them)" in result.stdout
+    for part in ("checkpoints", "summary.json"):
+        target = path / "problem.n=40" / part
+        target.rename(target.with_name(f"old-{part}"))
+    (path / "problem.n=40" / "checkpoints").touch()
+    result = program.run("--vary", "problem.n=40", "-o", path)
+    assert result.exit_code in (3, 4), result.output
+    assert "Not a directory" in result.stderr
+    assert isinstance(result.exception, SystemExit)

@@ -7,6 +7,7 @@ from sph.errors import ConfigError, FileError
 from sph.output.run_directory import RunDirectory
 from sph.sweep.manifest import SweepDirectory
 from sph.sweep.plan import Plan
+from sph.sweep.task import standing, tasks
 
 TUBE = '[problem]\nname = "shock_tube"\nn = 40\n'
 
@@ -102,9 +103,28 @@ def test_a_wrong_point_makes_no_directory(config, sweep):
     assert not sweep.path.exists()
 
 
-@pytest.mark.parametrize("text", ["", "points = 1", "[["])
+@pytest.mark.parametrize("text", [
+    "", "points = 1", "[[", 'set = "x"\n[vary]\n[points]', "set = []\n[vary]\nx = 1\n[points]",
+    "set = []\n[vary]\n[points]\na = [1]", "a = " + "[" * 5000,
+])  # fmt: skip
 def test_what_is_no_manifest(text, config, sweep):
     sweep.prepare(config, of("problem.n=50"))
     sweep.manifest.write_text(text)
     with pytest.raises(FileError, match="is not the manifest of a sweep"):
         sweep.prepare(config, of("problem.n=50"))
+
+
+def test_a_reason_that_is_not_text_is_told_as_far_as_it_is(config, sweep):
+    plan = of("problem.n=50,60,70,80")
+    sweep.prepare(config, plan)
+    names = [point.name for point in plan.points]
+    (sweep.logs / f"{names[0]}.failed").write_bytes(b"no\xff text\n")
+    (sweep.logs / f"{names[1]}.failed").touch()
+    (sweep.logs / f"{names[2]}.failed").mkdir()
+    found = sweep.failures()
+    assert found[names[0]] == "no\ufffd text"
+    assert found[names[1]] == "no reason was kept"
+    assert found[names[2]] == "the reason cannot be read: Is a directory"
+    standings = [standing(task) for task in tasks(sweep, plan)]
+    assert [one.status for one in standings] == ["failed", "failed", "stopped", "stopped"]
+    assert standings[0].reason == found[names[0]]
