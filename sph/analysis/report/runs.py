@@ -11,6 +11,7 @@ from typing import Any
 from sph import warnings
 from sph.config.toml_text import value_text
 from sph.errors import FileError
+from sph.output.files import read_text
 from sph.output.run_directory import RunDirectory
 from sph.sweep.manifest import SweepDirectory
 
@@ -161,7 +162,7 @@ def _row(path: Path) -> Row:
     path = path.resolve()
     run = RunDirectory(path)
     try:
-        tables = tomllib.loads(run.config.read_text(encoding="utf-8"))
+        tables = tomllib.loads(read_text(run.config))
     except (OSError, ValueError) as error:
         raise FileError(f"{run.config} cannot be read: {error}") from None
     settings = {
@@ -173,7 +174,7 @@ def _row(path: Path) -> Row:
     if not run.summary.is_file():
         return Row(path, path.name, settings, {}, "unfinished", "it has not ended")
     try:
-        summary = json.loads(run.summary.read_text(encoding="utf-8"))
+        summary = json.loads(read_text(run.summary))
         return Row(path, path.name, settings, summary, summary["status"], summary["reason"] or "")
     except (OSError, ValueError, KeyError) as error:
         raise FileError(f"{run.summary} cannot be read: {error!r}") from None
