@@ -13,6 +13,8 @@ from sph.problems.base import Section
 
 AtLeastZero = Annotated[float, Field(ge=0)]
 Count = Annotated[int, Field(ge=1)]
+# More passes than this converge no further, and a step would never end.
+Passes = Annotated[int, Field(ge=1, le=100)]
 
 
 class AlphaRange(Section):
@@ -112,7 +114,7 @@ class Physics(Section):
         description="less viscosity where the flow shears or rotates; in 1-D, where nothing "
         "rotates, only where |div v| is below 1e-4 c/H",
     )
-    density_passes: Count | Literal["converged"] = Field(
+    density_passes: Passes | Literal["converged"] = Field(
         2, description="passes of the density and smoothing length iteration in a step"
     )
     energy_limit: bool = Field(

@@ -1,7 +1,6 @@
 """The directory of a run: where everything is, and what may be replaced."""
 
 import fcntl
-import itertools
 import json
 import os
 import re
@@ -15,6 +14,7 @@ import numpy as np
 
 from sph.errors import FileError
 from sph.output import checkpoint, history, same_run
+from sph.output.checkpoint import Checkpoint
 from sph.output.files import (
     Damaged,
     explained,
@@ -134,7 +134,8 @@ class RunDirectory:
     def latest(self) -> Path:
         """The last checkpoint that is not damaged.
 
-        Raises FileError where there is none, or where a later one cannot be judged: it may be good.
+        Raises Damaged where there is none, FileError where a later one cannot be judged: it may be
+        good.
         """
         reason = "it has no checkpoints.\nTry: `sph run`, from the start"
         for path in reversed(self.checkpoints()):
@@ -144,7 +145,7 @@ class RunDirectory:
                 reason = str(error)
             else:
                 return path
-        raise FileError(f"{self.path} cannot be restarted: {reason}")
+        raise Damaged(f"{self.path} cannot be restarted: {reason}")
 
     def last_good(self) -> Path:
         """Of a run that failed, the last checkpoint from which energy had hardly drifted.
@@ -161,26 +162,29 @@ class RunDirectory:
                     return path
         return self.latest()
 
-    def check_belongs(self, path: Path) -> None:
+    def check_belongs(self, path: Path, state: Checkpoint, into: Path | None = None) -> None:
         """Raise FileError where the directory holds what is not of the run of checkpoint `path`.
 
-        Looked at are the history, the configuration, the checkpoint before and all later ones,
-        which a restart replaces. A damaged one is no obstacle.
+        `state` is what that holds. Looked at are the configuration, the history, the checkpoint
+        before and, unless the run goes on `into` another directory, all later ones, which it
+        replaces. A damaged one is no obstacle.
         """
-        if checkpoint_number(path) is None:
-            return
-        chosen = checkpoint.read(path)
-        same_run.check_configuration(self.config, chosen)
-        if self.history.exists():
-            same_run.check_history(self.history, chosen)
-        paths = self.checkpoints()
-        i = next((i for i, one in enumerate(paths) if one.name == path.name), 0)
-        known = {path.name: chosen}
-        for earlier, later in itertools.pairwise(paths[max(0, i - 1) :]):
+        same_run.check_configuration(self.config, state)
+        number = checkpoint_number(path)
+        if number or self.history.exists():  # the first may be a copy that no run went on from yet
+            same_run.check_history(self.history, state)
+        numbers = {checkpoint_number(one): one for one in self.checkpoints()}
+        for other in sorted((one for one in numbers if one < number), reverse=True):
             with suppress(Damaged):
-                pair = [known.get(one.name) or checkpoint.read(one) for one in (earlier, later)]
-                known = {later.name: pair[1]}
-                same_run.check_order(earlier, later, *pair)
+                before = checkpoint.read(numbers[other])
+                same_run.check_order(numbers[other], path, before, state)
+                break
+        stays = into is None or into.resolve() == self.path.resolve()
+        for other in sorted(one for one in numbers if one > number and stays):
+            with suppress(Damaged):
+                after = checkpoint.read(numbers[other])
+                same_run.check_order(path, numbers[other], state, after)
+                path, state = numbers[other], after
 
     def drop_checkpoints_after(self, number: int) -> None:
         """Remove later checkpoints, and what a killed run left unfinished. Raises FileError."""

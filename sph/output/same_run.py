@@ -12,7 +12,8 @@ from sph.output.checkpoint import Checkpoint
 from sph.output.files import read_text
 
 REMEDY = (
-    "Try: move what is not of this run out of the directory, or restart into a new one with -o."
+    "Try: move what is not of this run out of the directory; or copy the checkpoint out of it: "
+    "`sph restart COPY -o DIR` goes on from it alone."
 )
 
 
@@ -22,8 +23,17 @@ def check_configuration(path: Path, checkpoint: Checkpoint) -> None:
         there = configuration.from_text(read_text(path), str(path))
     except (ConfigError, FileError, OSError, UnicodeDecodeError):
         return  # missing or of another version: the checkpoint tells what it needs
-    if there.problem != checkpoint.config.problem:
-        raise _other(path, f"its [problem] is not that of the checkpoint at step {checkpoint.step}")
+    check_problem(path, there.problem, checkpoint.config.problem)
+
+
+def check_problem(path: Path, problem, of_the_run) -> None:
+    """Raise FileError where the problem in `path` is another than that of the run."""
+    if problem != of_the_run:
+        keys = problem.model_dump() | of_the_run.model_dump()
+        other = [
+            key for key in keys if getattr(problem, key, None) != getattr(of_the_run, key, None)
+        ]
+        raise _other(path, f"problem.{', problem.'.join(other)} differ from its other files")
 
 
 def check_history(path: Path, checkpoint: Checkpoint) -> None:
@@ -41,8 +51,7 @@ def check_history(path: Path, checkpoint: Checkpoint) -> None:
 
 def check_order(earlier: Path, later: Path, before: Checkpoint, after: Checkpoint) -> None:
     """Raise FileError where two checkpoints, next to each other by number, are not of one run."""
-    if before.config.problem != after.config.problem:
-        raise _other(later, f"its [problem] is not that of {earlier.name}")
+    check_problem(later, after.config.problem, before.config.problem)
     if not np.array_equal(np.sort(before.particles.id), np.sort(after.particles.id)):
         raise _other(later, f"its particles are not those of {earlier.name}")
     if after.step <= before.step or after.time <= before.time:

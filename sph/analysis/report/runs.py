@@ -163,20 +163,20 @@ def _row(path: Path) -> Row:
     run = RunDirectory(path)
     try:
         tables = tomllib.loads(read_text(run.config))
-    except (OSError, ValueError) as error:
+        settings = {
+            f"{table}.{key}": value
+            for table, keys in tables.items()
+            if table != "run"
+            for key, value in keys.items()
+        }
+    except (OSError, ValueError, AttributeError, RecursionError) as error:
         raise FileError(f"{run.config} cannot be read: {error}") from None
-    settings = {
-        f"{table}.{key}": value
-        for table, keys in tables.items()
-        if table != "run"
-        for key, value in keys.items()
-    }
-    if not run.summary.is_file():
+    if not run.summary.exists():
         return Row(path, path.name, settings, {}, "unfinished", "it has not ended")
     try:
         summary = json.loads(read_text(run.summary))
         return Row(path, path.name, settings, summary, summary["status"], summary["reason"] or "")
-    except (OSError, ValueError, KeyError) as error:
+    except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
         raise FileError(f"{run.summary} cannot be read: {error!r}") from None
 
 
