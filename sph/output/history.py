@@ -20,6 +20,10 @@ COUNTED = (
     "t", "kinetic_energy", "kinetic_energy_without_bulk", "internal_energy", "energy_drift",
     "energy_injected", "wall_seconds", "cpu_seconds", "potential_energy", "energy_added",
 )  # fmt: skip
+ALONE = (
+    "copy the checkpoint out of the run directory: `sph restart COPY -o DIR` goes on from it with "
+    "a new history."
+)
 # Sums over particles in another order differ by round-off; those of another state by far more.
 SAME_SUM = 1e-6
 
@@ -155,9 +159,7 @@ def check(
 
 def _of_another_run(path: Path, why: str) -> FileError:
     return FileError(
-        f"{path} is damaged or not of this run: {why}.\n"
-        "Try: an earlier checkpoint; or copy the checkpoint out of the run directory: "
-        "`sph restart COPY -o DIR` goes on from it with a new history."
+        f"{path} is damaged or not of this run: {why}.\nTry: an earlier checkpoint; or {ALONE}"
     )
 
 
@@ -166,7 +168,7 @@ def _check_columns(path: Path, names: Sequence[str], needed: Sequence[str]) -> N
     if missing:
         raise FileError(
             f"{path} lacks the columns {', '.join(missing)}: its first line is damaged, or another "
-            "version of sph wrote it.\nTry: the sph that wrote it."
+            f"version of sph wrote it.\nTry: the sph that wrote it; or {ALONE}"
         )
 
 

@@ -11,10 +11,7 @@ from sph.output import history
 from sph.output.checkpoint import Checkpoint
 from sph.output.files import read_text
 
-REMEDY = (
-    "Try: move what is not of this run out of the directory; or copy the checkpoint out of it: "
-    "`sph restart COPY -o DIR` goes on from it alone."
-)
+REMEDY = f"Try: move what is not of this run out of the directory; or {history.ALONE}"
 
 
 def check_configuration(path: Path, checkpoint: Checkpoint) -> None:

@@ -39,6 +39,8 @@ DAMAGE = (OSError, RuntimeError, KeyError, ValueError, TypeError, AttributeError
 # Limits of the child process: seconds and bytes, for the smallest file and for each of its bytes.
 SECONDS, SECONDS_A_BYTE = 10.0, 1 / 20e6
 MEMORY, MEMORY_A_BYTE = 256 << 20, 3
+# How much longer than its processor seconds it may take, on a machine that others use too.
+PATIENCE = 6
 
 
 class Refused(Exception):
@@ -76,7 +78,11 @@ def check_apart(file: io.FileIO, version: int) -> None:
     command = [sys.executable, "-P", __file__, str(version), str(seconds)]
     try:
         child = subprocess.run(
-            command, stdin=file.fileno(), capture_output=True, timeout=6 * seconds, check=False
+            command,
+            stdin=file.fileno(),
+            capture_output=True,
+            timeout=PATIENCE * seconds,
+            check=False,
         )
     except subprocess.TimeoutExpired:
         raise Refused("damaged", "HDF5 does not come to an end with it") from None
