@@ -37,7 +37,7 @@ TEXTS = ("configuration", "lineage", "sha256", "configuration_sha256")
 DAMAGE = (OSError, RuntimeError, KeyError, ValueError, TypeError, AttributeError)
 
 # Limits of the child process: seconds and bytes, for the smallest file and for each of its bytes.
-SECONDS, SECONDS_A_BYTE = 10.0, 1 / 20e6
+SECONDS, SECONDS_A_BYTE = 5.0, 1 / 20e6
 MEMORY, MEMORY_A_BYTE = 256 << 20, 3
 # How much longer than its processor seconds it may take, on a machine that others use too.
 PATIENCE = 6
