@@ -287,7 +287,6 @@ class Judge:
 
     def __init__(self, config: Config):
         self.config, self.eos = config, config.physics.eos_model()
-        self.problem = config.problem
         self._grid = None
 
     def row(self, case: Case, code: str, n: int, ended: dict) -> dict:
@@ -308,7 +307,7 @@ class Judge:
     def _errors(self, state) -> dict[str, float]:
         end = self.config.time.end
         pressure = self.eos.pressure(state.density, state.internal_energy)
-        found = errors.against_exact(self.problem, self.eos, end, state, pressure)
+        found = errors.against_exact(self.config, end, state, pressure)
         if found:
             return {name: norm["L1"] for name, norm in found["fields"].items()}
         truth = self._from_grid(state.position % 1.0)

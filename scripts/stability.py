@@ -4,7 +4,7 @@
     python scripts/stability.py [-o DIR] --table                       what is there, as Markdown
 
 Stopped and called again, it goes on where it was: runs that are there are not repeated. Problems
-are small and short, so that a search takes seconds.
+are small, so that a search takes seconds.
 """
 
 import argparse
@@ -18,8 +18,9 @@ ROOT = Path(__file__).parents[1]
 SCHEMES = ("grad_h", "variational", "pressure_energy")
 KEYS = ("physics.C", "physics.eta")
 
-# Shipped configurations, and what makes them small. Not too short: an instability needs some tens
-# of steps to be seen, at the largest C as well.
+# Shipped configurations, and what makes them small. Runs are whole: an instability may be slow. Two
+# are shortened, and the table says so: later the mode of kelvin_helmholtz and the broken ring are
+# chaotic, so runs at any two C differ.
 PROBLEMS = {
     "sod": {"problem.n": 200},
     "strong_shock": {"problem.n": 300},
@@ -31,14 +32,14 @@ PROBLEMS = {
     "uniform": {"problem.n": 256, "time.end": 2.0},
     "point_explosion_2d": {"problem.n": 1024},
     "gresho": {"problem.n": 576},
-    "square": {"problem.n": 448, "time.end": 0.5},
-    "kelvin_helmholtz_smooth": {"problem.n": 576, "time.end": 0.3},
+    "square": {"problem.n": 448},
+    "kelvin_helmholtz_smooth": {"problem.n": 576},
     "kelvin_helmholtz": {"problem.n": 1530, "time.end": 0.2},
     "yee": {"problem.n": 1024},
     "point_explosion": {"problem.n": 1728},
-    "expanding_ball": {"problem.n": 500, "time.end": 0.5},
+    "expanding_ball": {"problem.n": 500},
     "contrast": {},
-    "blob": {"problem.n": 1000, "time.end": 3.0},
+    "blob": {"problem.n": 1000},
     "keplerian_ring": {"problem.n": 500, "time.end": 3.0},
     "particles": {"time.end": 1.0},
 }
@@ -92,8 +93,8 @@ def search(directory: Path, only) -> None:
 def table(directory: Path, only) -> str:
     """A line for each problem and scheme that has been searched."""
     lines = [
-        "| problem | N, to t | scheme | C: stable up to | over its C | then | steps there "
-        "| run stops at | η: stable from | to | its η | below, above |",
+        "| problem | N, to t (of time.end) | scheme | C: stable up to | over its C | then "
+        "| steps there | run stops at | η: stable from | to | its η | below, above |",
         "| :--- | :--- | :--- | ---: | ---: | :--- | ---: | ---: | ---: | ---: | ---: | :--- |",
     ]
     for problem, scheme in combinations(only):
@@ -102,7 +103,7 @@ def table(directory: Path, only) -> str:
         if courant or eta:
             some = courant or eta
             lines.append(
-                f"| {problem} | {some.get('particles', '')}, {some.get('end', '')} | {scheme} | "
+                f"| {problem} | {some.get('particles', '')}, {_time(some)} | {scheme} | "
                 f"{' | '.join((*_courant(courant), *_eta(eta)))} |"
             )
     return "\n".join(lines)
@@ -113,6 +114,14 @@ def _read(target: Path, key: str) -> dict:
     if path.exists():
         return json.loads(path.read_text())
     return {"failed": said.read_text()} if said.exists() else {}
+
+
+def _time(found: dict) -> str:
+    """To what time the runs went, and of which where the configuration's own is later."""
+    if "end" not in found:
+        return ""
+    end, whole = found["end"], found["whole_end"]
+    return f"{end:g} ({whole:g})" if end < whole else f"{end:g}"
 
 
 def _courant(found: dict) -> tuple[str, str, str, str, str]:
@@ -154,7 +163,12 @@ def _why(found: dict, end: dict) -> str:
         )
     field = next(one["field"] for one in found["trials"] if one["value"] == end["unstable"])
     parts = [f"error of {field.replace('_', ' ')}"] * ("the error of" in end["reason"])
-    return ", ".join([*parts, *["energy"] * ("energy drifts" in end["reason"])])
+    parts += ["energy"] * ("energy drifts" in end["reason"])
+    reference = found["reference"]
+    figures = [
+        name.replace("_", " ") for name in reference["largest_figures"] | reference["figures"]
+    ]
+    return ", ".join([*parts, *(name for name in figures if f"{name} is " in end["reason"])])
 
 
 def main() -> None:

@@ -111,7 +111,7 @@ STUDIES = {
         ("--field", "report.error_v_phi"),
         {
             "scheme": SCHEME,
-            "kernel": KERNEL,
+            "kernel": (*KERNEL, "physics.allow_pairing=true"),
             "eta": ("physics.eta=1.6,2.2,3.0,3.8",),
             "alpha": (f"physics.alpha=0.1,0.5,1.0,{MORRIS_MONAGHAN}",),
             "alpha_without_balsara": WITHOUT_BALSARA,

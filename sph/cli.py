@@ -1,11 +1,19 @@
 """The command line."""
 
+import signal
 import sys
+
+if __name__ == "__main__":  # python -m sph.cli: as `sph`, before the imports below take time
+    from sph.__main__ import main
+
+    sys.exit(main())
+
 from pathlib import Path
 
 import click
 
 from sph import cli_studies
+from sph.docstrings import docstring
 from sph.errors import ConfigError, NumericalError, SphError
 from sph.version import __version__
 
@@ -33,6 +41,9 @@ class Program(click.Group):
         except MemoryError as error:
             click.echo(f"sph: out of memory: {error}\nTry: a smaller problem.n.", err=True)
             sys.exit(ConfigError.exit_code)
+        except KeyboardInterrupt:  # the second of two, where the first asks for a checkpoint
+            click.echo("sph: ended by Ctrl-C", err=True)
+            sys.exit(128 + signal.SIGINT)
 
 
 @click.group(cls=Program, context_settings={"help_option_names": ["-h", "--help"]})
@@ -133,7 +144,7 @@ def list_choices():
         click.echo(f"{package}:")
         for name in registry.names(f"sph.{package}"):
             module = registry.load(f"sph.{package}", name)
-            click.echo(f"  {name:24s} {module.__doc__.strip().splitlines()[0]}")
+            click.echo(f"  {name:24s} {docstring(module).strip().splitlines()[0]}")
     click.echo("stress cases:")
     for case in stress_cases():
         click.echo(f"  {case.name:24s} {case.title}")
@@ -162,5 +173,5 @@ main.add_command(cli_studies.report)
 main.add_command(cli_studies.stress)
 main.add_command(cli_studies.stability)
 
-if __name__ == "__main__":
-    main()
+for _command in (main, *main.commands.values()):
+    _command.help = docstring(_command.callback)

@@ -29,6 +29,12 @@ class FileError(SphError):
     exit_code = 4
 
 
+class AtEnd(SphError):
+    """There is nothing left to compute, and nothing was asked for that would change that."""
+
+    exit_code = 0
+
+
 class Stopped(SphError):
     """The run stopped early and left a checkpoint that can be restarted."""
 

@@ -1,14 +1,20 @@
 """Go on from a checkpoint: what may change, where it goes on, and that it does bit for bit."""
 
+import dataclasses
+import json
 from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 
+from sph import config as configuration
+from sph import fingerprint
 from sph.analysis import reference
 from sph.clock import Clock
-from sph.config import Config
-from sph.errors import ConfigError, FileError
+from sph.config import Config, restarts
+from sph.config.restarts import Change
+from sph.errors import AtEnd, ConfigError, FileError, SphError
+from sph.integrators import step_size
 from sph.neighbours.search import Origin
 from sph.output import checkpoint as checkpoints
 from sph.output.checkpoint import Checkpoint
@@ -16,7 +22,7 @@ from sph.output.files import copy_file
 from sph.output.history import History
 from sph.output.offenders import PART
 from sph.output.run_directory import RunDirectory, checkpoint_number, find
-from sph.runner import Runner, new_history, session, threads_of
+from sph.runner import Runner, new_history, output_times, session, threads_of
 from sph.scene import Scene
 from sph.simulation import Simulation
 
@@ -28,7 +34,7 @@ def restart(
 
     Later checkpoints are replaced. overrides: `a.b=VALUE`; directory: a new run directory, or None
     for the one that the checkpoint is in. Returns the summary and the run directory. Raises as
-    `run`, and FileError and ConfigError before anything is changed.
+    `run`, and FileError, ConfigError and AtEnd before anything is changed.
     """
     home, path = find(source)
     checkpoint = checkpoints.read(path)
@@ -40,69 +46,83 @@ def restart(
             "Try: the run's last good checkpoint, with other settings."
         )
     config = checkpoint.config.override(overrides)
-    _check_changes(config, checkpoint)
+    changed = restarts.changes(checkpoint.config, config)
+    _check_changes(changed, config, checkpoint)
+    in_place = directory is None or (
+        home is not None and directory.resolve() == home.path.resolve()
+    )
+    is_closed = not (in_place and _is_last_without_summary(home, path, checkpoint.time))
+    _check_steps_left(source, changed, config, checkpoint.time, is_closed)
     reference.check(config, directory or (home and home.path))
     if source.is_dir():
         _note_damaged(home, path, progress)
+        _note_other_settings(home, checkpoint.config, config, progress)
     target, number = _place_to_go_on(home, path, directory)
-    with session(target) as (stopped_by, clock):
-        target.write_config(config.to_toml())
-        simulation = _resumed(config, checkpoint, clock)
-        target.drop_checkpoints_after(number)
-        for old in (target.summary, target.offenders):  # a run that is killed must not keep them
-            old.unlink(missing_ok=True)
+    if reason := fingerprint.differences(checkpoint.computed_by):
+        progress.note(reason)
+    with session(target, config, progress) as (stopped_by, clock):
+        lineage = (
+            *checkpoint.lineage,
+            restarts.lineage(checkpoint.step, checkpoint.time, changed),
+        )
+        next_step = _coming_step(config, checkpoint)
+        begun = dataclasses.replace(checkpoint, config=config, lineage=lineage, next_step=next_step)
+        _begin_anew(target, number, begun, any(not one.key.startswith("run.") for one in changed))
+        simulation = _resumed(begun, clock)
         if target.history.exists():
             history = History.resume(target.history, checkpoint.step)
         else:
             history = new_history(config, simulation, target)
-        lineage = f"restarted at step {checkpoint.step}, t = {checkpoint.time!r}"
         runner = Runner(config, target, simulation, history, progress, stopped_by)
         runner.number, runner.saved_step = number + 1, checkpoint.step
-        runner.lineage = (*checkpoint.lineage, lineage)
+        runner.lineage = lineage
         return runner.from_checkpoint(), target
 
 
-def _resumed(config: Config, checkpoint: Checkpoint, clock: Clock) -> Simulation:
+def _begin_anew(target: RunDirectory, number: int, begun: Checkpoint, is_changed: bool) -> None:
+    """Make the directory say what goes on from checkpoint `number`, at every moment one truth.
+
+    What a later state left goes first. Then the settings go into the checkpoint itself, from which
+    every restart takes them: one that is stopped before its first step would lose them else.
+    config.toml, which nobody goes on from, is last.
+    """
+    for old in (target.summary, target.offenders):
+        old.unlink(missing_ok=True)
+    target.drop_checkpoints_after(number)
+    if is_changed:
+        checkpoints.write(target.checkpoint_path(number), begun)
+    target.write_config(begun.config.to_toml())
+
+
+def _resumed(checkpoint: Checkpoint, clock: Clock) -> Simulation:
+    config = checkpoint.config
     origin = Origin(checkpoint.list_position, checkpoint.list_support, checkpoint.list_skin)
     return Simulation.resume(
         Scene(config), checkpoint.particles, checkpoint.time, checkpoint.step,
-        _coming_step(config, checkpoint), origin, threads_of(config), clock,
+        checkpoint.next_step, origin, threads_of(config), clock,
     )  # fmt: skip
 
 
 def _coming_step(config: Config, checkpoint: Checkpoint) -> float:
     """The checkpoint's next step, or what becomes of it under other limits (eq 32)."""
     now, before, p = config.physics, checkpoint.config.physics, checkpoint.particles
-    step = checkpoint.next_step * (now.C / before.C)  # unchanged where C is: bit for bit
+    scene = Scene(config)
+    held, held_before = (s.step_bounds.held[0] for s in (scene, Scene(checkpoint.config)))
+    step = checkpoint.next_step * (held / held_before)  # unchanged where both are: bit for bit
+    if step > checkpoint.next_step:
+        limit = step_size.StepLimit(step, 0, "checkpoint")
+        step = step_size.before_contact(limit, scene.step_bounds, p, scene.domain).dt
     if now.energy_limit and not before.energy_limit:
         warm = p.internal_energy > 0.0  # as for every step: what has no energy sets none
         with np.errstate(divide="ignore"):
             times = p.internal_energy[warm] / np.abs(p.energy_rate[warm])
-        step = min(step, float(now.C * np.min(times, initial=np.inf)))
+        step = min(step, float(held * np.min(times, initial=np.inf)))
     return step
 
 
-def _check_changes(config: Config, checkpoint: Checkpoint) -> None:
+def _check_changes(changed: list[Change], config: Config, checkpoint: Checkpoint) -> None:
     """Raise ConfigError where `config` wants what the particles of a checkpoint cannot give."""
-    before, after = checkpoint.config.problem.model_dump(), config.problem.model_dump()
-    wrong = [
-        f"problem.{key} cannot be changed in a restart: the particles are there already"
-        for key in after
-        if key not in before or after[key] != before[key]
-    ]
-    now, then = config.physics, checkpoint.config.physics
-    for key, changed in (
-        ("external", now.external != then.external),
-        ("heating", (now.heating is None) != (then.heating is None)),
-    ):
-        if changed:
-            wrong.append(
-                f"physics.{key}: expected as in the checkpoint, for the run's energy is measured "
-                "by what it began with"
-            )
-    if Scene(config).evolves_alpha != (checkpoint.particles.alpha is not None):
-        kind = "one number" if checkpoint.particles.alpha is None else "a range"
-        wrong.append(f"physics.alpha: expected {kind}, as in the checkpoint")
+    wrong = restarts.refusals(changed)
     if config.time.end < checkpoint.time:
         wrong.append(
             f"time.end = {config.time.end}: expected a later time than the checkpoint's, "
@@ -112,11 +132,57 @@ def _check_changes(config: Config, checkpoint: Checkpoint) -> None:
         raise ConfigError("\n".join(wrong))
 
 
+def _check_steps_left(
+    source: Path, changed: list[Change], config: Config, time: float, is_closed: bool
+) -> None:
+    """Raise ConfigError for settings that no step would be made with, AtEnd for a closed run."""
+    if any(output_times(config.time.end, config.output.interval, time)):
+        return
+    settings = [str(one) for one in changed if not one.key.startswith("run.")]
+    if settings:
+        raise ConfigError(
+            f"{source} is at its end, t = {time:g}: no step would be computed with "
+            f"{', '.join(settings)}.\nTry: a later time.end, or an earlier checkpoint."
+        )
+    if is_closed:
+        raise AtEnd(f"{source} is at its end, t = {time:g}: set a later time.end to go on.")
+
+
+def _is_last_without_summary(home: RunDirectory | None, path: Path, time: float) -> bool:
+    """Whether a run was killed after its last checkpoint, `path`, and before its summary."""
+    if home is None or checkpoint_number(path) != checkpoint_number(home.checkpoints()[-1]):
+        return False
+    try:
+        found = json.loads(home.summary.read_text(encoding="utf-8"))
+        return (found["status"], found["time"]) != ("done", time)
+    except (OSError, ValueError, LookupError, TypeError):
+        return True
+
+
+def _note_other_settings(home: RunDirectory, before: Config, config: Config, progress) -> None:
+    """Say where config.toml differs from the checkpoint and --set: nothing of it is used.
+
+    A user has edited it, or a restart with other settings was killed before its first checkpoint.
+    """
+    try:
+        written = configuration.load(home.config)
+    except SphError:
+        return
+    unused = set(map(str, restarts.changes(before, written)))
+    unused &= set(map(str, restarts.changes(config, written)))
+    for one in sorted(one for one in unused if not one.startswith("run.")):
+        progress.note(
+            f"{home.config} has {one.replace('(was', '(the checkpoint:', 1)}: going on with the "
+            "setting of the checkpoint; --set changes it"
+        )
+
+
 def _note_damaged(home: RunDirectory, good: Path, progress) -> None:
     """Say which checkpoints after the last good one were passed over."""
     for path in home.checkpoints():
         if checkpoint_number(path) > checkpoint_number(good):
-            progress.note(f"{path} cannot be read: going on from {good.name}")
+            why = "energy had drifted by then" if home.has_failed else "cannot be read"
+            progress.note(f"{path} is passed over ({why}): going on from {good.name}")
 
 
 def _place_to_go_on(

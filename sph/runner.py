@@ -2,13 +2,13 @@
 
 import itertools
 import math
-import os
 from collections.abc import Iterator
 from contextlib import closing, contextmanager
 from pathlib import Path
 
 import numpy as np
 
+from sph import faults
 from sph.analysis import reference, summary
 from sph.clock import Clock
 from sph.config import Config
@@ -23,6 +23,7 @@ from sph.output.run_directory import RunDirectory
 from sph.scene import Scene
 from sph.simulation import Simulation
 from sph.stop_signals import stop_signals
+from sph.threads import available_processors
 
 # A time closer than this to an output, relative to the interval or the end, is that output.
 SAME_TIME = 1e-9
@@ -35,8 +36,8 @@ def run(config: Config, directory: RunDirectory, progress) -> dict:
     close(). Raises NumericalError or Stopped, with what was reached kept in the directory, and
     FileError.
     """
-    with session(directory) as (stopped_by, clock):
-        progress.note("preparing: the first run of a scene compiles its code, for up to a minute")
+    with session(directory, config, progress) as (stopped_by, clock):
+        progress.note("preparing the initial state")
         simulation = Simulation.of_problem(Scene(config), threads_of(config), clock)
         directory.write_config(config.to_toml())
         try:
@@ -54,11 +55,19 @@ def run(config: Config, directory: RunDirectory, progress) -> dict:
 
 
 @contextmanager
-def session(directory: RunDirectory) -> Iterator[tuple[list[str], Clock]]:
+def session(directory: RunDirectory, config: Config, progress) -> Iterator[tuple[list[str], Clock]]:
     """What a run works in: alone in its directory, heeding signals (the list), by a clock."""
+    if (threads := threads_of(config)) > (processors := available_processors()):
+        progress.note(
+            f"run.threads = {threads}, but this process may use {processors} processor(s): more "
+            "threads than processors make a run no faster; its results stay the same"
+        )
     # what is no number the watchdog finds, and names: NumPy's words would come before its own
     quiet = np.errstate(all="ignore")
     with directory.alone(), stop_signals() as stopped_by, closing(Clock()) as clock, quiet:
+        clock.on_compilation = lambda: progress.note(
+            "compiling the code of this scene: up to a minute, in its first run only"
+        )
         yield stopped_by, clock
 
 
@@ -110,7 +119,7 @@ def _of_the_scene(simulation: Simulation) -> dict[str, float]:
 def threads_of(config: Config) -> int:
     """The number of threads a configuration asks for; "all" is every processor we may use."""
     if config.run.threads == "all":
-        return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
+        return available_processors()
     return config.run.threads
 
 
@@ -180,6 +189,8 @@ class Runner:
     def _to_end(self) -> dict:
         simulation, end = self.simulation, self.config.time.end
         times = output_times(end, self.config.output.interval, simulation.time)
+        if held := faults.held_courant(simulation.scene):
+            self.progress.note(held)
         self.progress.start(simulation.time, end)
         try:
             for output in times:
@@ -266,6 +277,7 @@ class Runner:
             read_history(self.directory.history),
             status=status,
             reason=reason,
+            lineage=self.lineage,
         )
         self.directory.write_summary(result)
         named = self.config.report.reference

@@ -9,6 +9,7 @@ import numpy as np
 from sph import kernels, schemes
 from sph.config import Config
 from sph.domain import Domain
+from sph.integrators.step_size import Bounds
 from sph.passes import Models
 from sph.passes.smoothing import Converged, FixedPasses
 from sph.passes.weighting import ByMass, ByNumber
@@ -94,6 +95,15 @@ class Scene:
     def bounds_acceleration(self) -> bool:
         """Whether |a| bounds the step: a field, or heavy gas beside light, sends no signal."""
         return self.external is not None or self.config.physics.density == "number"
+
+    @cached_property
+    def step_bounds(self) -> Bounds:
+        """What bounds the time step, of what the configuration sets."""
+        physics = self.config.physics
+        return Bounds(
+            physics.C, physics.energy_limit, self.bounds_acceleration, self.config.time.end,
+            self.viscosity.largest(), getattr(self.models.conductivity, "strength", 0.0),
+        )  # fmt: skip
 
     @property
     def needs_curl(self) -> bool:

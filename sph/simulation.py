@@ -9,7 +9,7 @@ from sph.integrators import leapfrog, step_size
 from sph.neighbours.order import number_of_blocks
 from sph.neighbours.search import Origin, Search
 from sph.particles import Particles
-from sph.passes import contacts, density, rates, shocks
+from sph.passes import contacts, density, nearest, rates, shocks
 from sph.scene import Scene
 from sph.threads import Team
 from sph.watchdog import Watchdog
@@ -57,10 +57,6 @@ class Simulation:
             particles.pressure = None
         elif particles.pressure is None:  # a start, or a restart that has changed the scheme
             particles.pressure = particles.pressure_by(scene.eos)
-        physics = scene.config.physics
-        self._bounds = step_size.Bounds(
-            physics.C, physics.energy_limit, scene.bounds_acceleration, scene.config.time.end
-        )
         if not scene.evolves_alpha or scene.finds_shocks:
             particles.alpha_rate = None
         elif particles.alpha_rate is None:  # a restart that has changed the switch
@@ -173,6 +169,19 @@ class Simulation:
         """Sum of m/rho over the volume of the box, None where gas does not fill a closed box."""
         return self.totals.volume / self.scene.domain.volume if self.scene.is_filled else None
 
+    def nearest(self) -> np.ndarray:
+        """(N,) distance of each particle to its nearest neighbour, in particle spacings.
+
+        inf where no neighbour lies within the support.
+        """
+        p = self.particles
+        found = np.empty(p.number)
+        self.team.run(
+            nearest.nearest, self._wanted.size, self._dim, self._neighbours(), p.position,
+            p.support, p.mass, p.density, found,
+        )  # fmt: skip
+        return found
+
     def close(self) -> None:
         self.team.close()
 
@@ -218,7 +227,7 @@ class Simulation:
     def _neighbours(self) -> passes.Neighbours:
         search = self.search
         return passes.Neighbours(
-            search.lists, search.domain.images, search.origin.support, search.reach_factor
+            search.lists, search.images, search.origin.support, search.reach_factor
         )
 
     def _gas(self) -> passes.Gas:
@@ -312,7 +321,7 @@ class Simulation:
             if self.baseline is None:
                 self.baseline = totals.Baseline.at(self.totals, self.energy_added)
             self.energy_drift = self.baseline.drift(self.totals, self.energy_added)
-            self.limit = step_size.limit(
-                self._bounds, self.particles, self._signal_speed, self._div_v, past
-            )
+            bounds, p = self.scene.step_bounds, self.particles
+            limit = step_size.limit(bounds, p, self._signal_speed, self._div_v, past)
+            self.limit = step_size.before_contact(limit, bounds, p, self.scene.domain)
             self.watchdog.check(self)

@@ -16,6 +16,10 @@ MOMENTUM = 1e-6
 # Shipped scenes keep sum m/rho to 5 % of the box, most of them to 3 %; too few neighbours (eta of
 # 0.85 in 2-D) miss it by 12 %.
 VOLUME = 0.06
+# Healthy runs end with median distances from .85 (Gresho's vortex, 32^2) to 1.07 (a hexagonal
+# lattice) of the spacing, and particles at random places begin with .54; kernels that pair end
+# below .46 (docs/measurements.md).
+PAIRED = 0.5
 
 
 class Warning(NamedTuple):
@@ -35,6 +39,7 @@ def of_run(simulation, summary: dict[str, Any]) -> list[Warning]:
         *_volume(summary["conservation"]),
         *_held(simulation),
         *_resolution(simulation),
+        *_paired(summary["nearest"]),
         *_limits(problem, summary),
     ]
 
@@ -114,6 +119,16 @@ def _held(simulation) -> Iterator[Warning]:
 def _resolution(simulation) -> Iterator[Warning]:
     if text := resolution.doubt(simulation):
         yield Warning("resolution", text)
+
+
+def _paired(nearest: dict[str, float] | None) -> Iterator[Warning]:
+    if nearest and nearest["median"] < PAIRED:
+        yield Warning(
+            "paired",
+            "particles have paired: the median distance to the nearest neighbour is "
+            f"{nearest['median']:.2g} of the particle spacing, so the run has fewer resolution "
+            "elements than particles. Try a Wendland kernel, or a smaller physics.eta.",
+        )
 
 
 def _limits(problem, summary) -> Iterator[Warning]:

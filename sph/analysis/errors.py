@@ -2,6 +2,9 @@
 
 import numpy as np
 
+from sph.analysis import truth
+from sph.config import Config
+
 FIELDS = ("density", "velocity", "pressure", "internal_energy")
 
 
@@ -19,27 +22,37 @@ def norms(difference, volume) -> dict[str, float]:
     }
 
 
-def against_exact(problem, eos, time: float, particles, pressure) -> dict | None:
-    """Norms by field over the problem's error region, or None where there is no exact solution.
+def by_field(state: dict, exact: dict, volume, inside) -> dict[str, dict[str, float | None]]:
+    """Norms of state - exact of each field over the particles `inside` (N,), volume (N,).
 
-    {"region": words, "particles": how many, "fields": {field: {"L1": …, "L2": …, "Linf": …}}}
+    "relative_L1" is sum V |d| / sum V |exact|, None where the exact field is zero everywhere. That
+    of a velocity depends on the frame of reference: |v| is its size, and not |v| + c_s.
     """
+    found = {}
+    for name in FIELDS:
+        if name in exact:
+            difference, true = ((state[name] - exact[name]), exact[name])
+            found[name] = norms(difference[..., inside], volume[inside])
+            size = norms(true[..., inside], volume[inside])["L1"]
+            found[name]["relative_L1"] = found[name]["L1"] / size if size > 0.0 else None
+    return found
+
+
+def against_exact(config: Config, time: float, particles, pressure) -> dict | None:
+    """Norms by field where the exact solution holds, or None: `truth.left_out` says why.
+
+    {"region": words, "particles": how many, "fields": {field: {"L1": …, …}}}, see `by_field`
+    """
+    if truth.left_out(config, time, particles.position):
+        return None
+    problem, eos = config.problem, config.physics.eos_model()
     exact = problem.exact(eos, time, particles.position)
-    if exact is None:
-        return None
-    inside, words = problem.error_region(eos, time, particles.position)
-    if not inside.any():
-        return None
+    inside, words = truth.region(problem, eos, time, particles.position)
     state = {
         "density": particles.density,
         "velocity": particles.velocity,
         "pressure": pressure,
         "internal_energy": particles.internal_energy,
     }
-    volume = (particles.mass / particles.density)[inside]
-    fields = {
-        name: norms((state[name] - exact[name])[..., inside], volume)
-        for name in FIELDS
-        if name in exact
-    }
+    fields = by_field(state, exact, particles.mass / particles.density, inside)
     return {"region": words, "particles": int(inside.sum()), "fields": fields}

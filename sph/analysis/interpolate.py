@@ -47,7 +47,7 @@ def onto_plane(values: np.ndarray, particles, domain: Domain, kernel, plane: Pla
     first = plane.low + step / 2
     sums = np.zeros((len(values), plane.shape[1], plane.shape[0]))
     total = np.zeros(sums.shape[1:])
-    for sign, offset in zip(*domain.images, strict=True):
+    for sign, offset in zip(*domain.images_within(H.max()), strict=True):
         image = sign[:, None] * particles.position + offset[:, None]
         depth = image[2] - plane.height if particles.dimension == 3 else np.zeros(H.size)
         near = np.flatnonzero(_reaches(image[:2], depth, H, plane))

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial import cKDTree
 
-from sph.analysis.errors import FIELDS, norms
+from sph.analysis.errors import FIELDS, by_field
 from sph.config import Config
 from sph.domain import Domain
 from sph.errors import ConfigError
@@ -90,9 +90,7 @@ def errors_against(coarse: Checkpoint, reference: Reference, name: str) -> dict:
     )
     exact = at_points(fine, particles.position)
     inside = inside & np.isfinite(exact["density"])
-    volume = (particles.mass / particles.density)[inside]
-    state = _fields(coarse)
-    fields = {name: norms((state[name] - exact[name])[..., inside], volume) for name in FIELDS}
+    fields = by_field(_fields(coarse), exact, particles.mass / particles.density, inside)
     return {
         "region": words,
         "particles": int(inside.sum()),
@@ -117,7 +115,8 @@ def at_points(state: Checkpoint, points: np.ndarray) -> dict[str, np.ndarray]:
     tree = cKDTree(points.T)
     low, high = points.min(axis=1), points.max(axis=1)
     sums = np.zeros((len(scalars) + particles.dimension + 1, points.shape[1]))
-    for sign, offset in zip(*Domain(problem.box, problem.boundaries).images, strict=True):
+    domain = Domain(problem.box, problem.boundaries)
+    for sign, offset in zip(*domain.images_within(H.max()), strict=True):
         image = sign[:, None] * particles.position + offset[:, None]
         values = np.vstack([scalars, sign[:, None] * fields["velocity"], np.ones_like(H)])
         reaches = (image + H > low[:, None]) & (image - H < high[:, None])

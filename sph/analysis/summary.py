@@ -6,46 +6,66 @@ import sys
 import numpy as np
 
 from sph import warnings
-from sph.analysis import errors
+from sph.analysis import errors, truth
+from sph.config import restarts
 from sph.totals import Baseline
 from sph.version import __version__
 
 
-def of_run(simulation, history: dict[str, np.ndarray], status: str, reason: str | None) -> dict:
+def of_run(
+    simulation, history: dict[str, np.ndarray], status: str, reason: str | None,
+    lineage: tuple[str, ...] = (),
+) -> dict:  # fmt: skip
     """The summary as a dictionary, from the simulation's last state and the whole history.
 
     status: "done", "stopped" or "failed", then with the reason. Errors are those against the exact
     solution; where the configuration names a reference they are left to `reference.errors_against`.
     """
     scene, particles = simulation.scene, simulation.particles
-    problem, eos = scene.config.problem, scene.eos
-    pressure = particles.pressure_by(eos)
     inside, outside = scene.parts()
     result = {
         "status": status,
         "reason": reason,
         "warnings": [],
         "version": __version__,
-        "problem": problem.name,
+        "problem": scene.config.problem.name,
         "dimension": scene.dimension,
         "particles": particles.number,
         "time": simulation.time,
         "steps": simulation.step,
+        "lineage": list(lineage),
+        "settings_changed": restarts.settings_changed(lineage),
         "errors": None,
+        "errors_left_out": None,
         "report": None,
         "conservation": conservation(history, particles, scene),
+        "nearest": None,
         "cost": cost(simulation, history),
         "compiled_in": inside,
         "left_out": outside,
     }
-    if status != "failed":
-        if not scene.config.report.reference:
-            exact = errors.against_exact(problem, eos, simulation.time, particles, pressure)
-            result["errors"] = exact
-        report = problem.report(eos, simulation.time, particles, pressure)
-        result["report"] = report | problem.over_time(eos, history)
+    if status == "failed":
+        result["errors_left_out"] = "the run failed"
+    else:
+        _judge(result, simulation, history)
+        nearest = simulation.nearest()
+        result["nearest"] = {
+            "median": float(np.median(nearest)), "smallest": float(nearest.min())
+        }  # fmt: skip
     warn(result, simulation)
     return result
+
+
+def _judge(result: dict, simulation, history) -> None:
+    """Set errors and the problem's own figures of a run that has not failed."""
+    config, now, particles = simulation.scene.config, simulation.time, simulation.particles
+    pressure = particles.pressure_by(simulation.scene.eos)
+    if not config.report.reference:
+        result["errors"] = errors.against_exact(config, now, particles, pressure)
+        result["errors_left_out"] = truth.left_out(config, now, particles.position)
+    elif result["status"] != "done":
+        result["errors_left_out"] = "the run stopped before time.end"
+    result["report"] = truth.figures(config, now, particles, pressure, history)
 
 
 def warn(summary: dict, simulation) -> None:
@@ -134,12 +154,18 @@ def peak_memory() -> int:
     return peak if sys.platform == "darwin" else peak * 1024
 
 
+def _percent(relative: float | None) -> str:
+    """An error relative to the exact field, in brackets; nothing where that is zero."""
+    return "" if relative is None else f" ({100.0 * relative:.2g} %)"
+
+
 def in_words(summary: dict) -> str:
     """The closing words of a run: how it ended, its warnings, errors, what it kept and its cost."""
     lines = [
         f"{summary['problem']}: {summary['particles']} particles to t = {summary['time']:.6g} "
         f"in {summary['steps']} steps ({_ending(summary)}).",
         *(f"Warning: {one['text']}" for one in summary["warnings"]),
+        *_changes_in_words(summary),
         _errors_in_words(summary),
         *(
             f"  {name.replace('_', ' ')}: {value:.6g}"
@@ -157,12 +183,18 @@ def _ending(summary: dict) -> str:
     return f"{summary['status']}{warned}"
 
 
+def _changes_in_words(summary: dict) -> list[str]:
+    changed = summary["settings_changed"]
+    return [f"Settings changed on the way: {'; '.join(changed)}."] if changed else []
+
+
 def _errors_in_words(summary: dict) -> str:
     errors = summary["errors"]
     if not errors:
-        return "Error: this problem has no exact solution here."
+        return f"Error: left out, because {summary['errors_left_out']}."
     fields = ", ".join(
-        f"{name.replace('_', ' ')} {norm['L1']:.3g}" for name, norm in errors["fields"].items()
+        f"{name.replace('_', ' ')} {norm['L1']:.3g}{_percent(norm['relative_L1'])}"
+        for name, norm in errors["fields"].items()
     )
     named = errors.get("reference")
     truth = "the exact solution" if named is None else f"the run {named}"

@@ -7,6 +7,7 @@ A conductivity is a file that holds a NamedTuple with the method
 where w_ij <= 0 is the speed of approach (eq 26). The pair then exchanges energy at the rate
 m_j exchange_speed (u_i - u_j) / rho_ij (dW/dr), equal and opposite for the two. A field `switched`
 tells whether that is times the mean of the two particles' shares, found by the pass over contacts.
+The class attribute `suits_gravity` tells whether it rests in equilibrium with an external field.
 """
 
 import numpy as np

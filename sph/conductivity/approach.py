@@ -12,5 +12,7 @@ class Approach(NamedTuple):
     strength: float = 1.0
     switched: bool = False
 
+    suits_gravity = True
+
     def exchange_speed(self, pressure_i, pressure_j, density_i, density_j, w_ij):
         return -self.strength * w_ij

@@ -15,6 +15,8 @@ class PressureJump(NamedTuple):
     strength: float = 1.0
     switched: bool = False
 
+    suits_gravity = False
+
     def exchange_speed(self, pressure_i, pressure_j, density_i, density_j, w_ij):
         rho_ij = 0.5 * (density_i + density_j)
         return self.strength * np.sqrt(abs(pressure_i - pressure_j) / rho_ij)

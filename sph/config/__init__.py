@@ -49,8 +49,11 @@ def load(path: str | Path, overrides: Sequence[str] = ()) -> Config:
 
 
 def from_text(text: str, source: str = "checkpoint") -> Config:
-    """The configuration in a TOML text; `source` names it in errors. Raises ConfigError."""
-    return _resolve(reading.parse(text, source), ())
+    """The configuration of a run, in a TOML text; `source` names it in errors.
+
+    Raises ConfigError.
+    """
+    return _resolve(reading.parse(text, source), (), recorded=True)
 
 
 def template(problem: str) -> str:
@@ -65,8 +68,8 @@ def template(problem: str) -> str:
     return commented.text({name: getattr(default, name) for name in _names()})
 
 
-def _resolve(source: reading.Source, overrides: Sequence[str]) -> Config:
-    return Config(**reading.resolve(source, overrides, SECTIONS))
+def _resolve(source: reading.Source, overrides: Sequence[str], recorded: bool = False) -> Config:
+    return Config(**reading.resolve(source, overrides, SECTIONS, recorded))
 
 
 def _names() -> list[str]:

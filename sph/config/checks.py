@@ -1,5 +1,6 @@
 """Checks across keys: what each key allows by itself, but not together."""
 
+import math
 from typing import Any
 
 from sph.config.errors import Issue
@@ -18,16 +19,53 @@ def both_given(raw: dict[str, dict[str, Any]]) -> list[Issue]:
 
 
 def gas_issues(found: dict[str, Section]) -> list[Issue]:
-    """A problem that is solved for an ideal gas, with another one."""
-    if not {"problem", "physics"} <= found.keys() or not found["problem"].ideal_gas:
+    """A problem that is solved for an ideal gas, or for gamma below a bound, with another gas."""
+    if not {"problem", "physics"} <= found.keys():
         return []
     from sph import eos
 
-    physics = found["physics"]
-    if eos.is_ideal(physics.eos_model()):
+    problem, physics = found["problem"], found["physics"]
+    gas, key = physics.eos_model(), "gamma" if physics.eos is None else "eos"
+    if problem.ideal_gas and not eos.is_ideal(gas):
+        text = f"expected an ideal gas for {problem.name}"
+    elif not getattr(gas, "gamma", 0.0) < problem.gamma_below:
+        text = f"expected gamma below {problem.gamma_below:g} for {problem.name}"
+    else:
         return []
-    text = f"= {value_text(physics.eos)}: expected an ideal gas for {found['problem'].name}"
-    return [Issue(("physics", "eos"), text)]
+    return [Issue(("physics", key), f"= {value_text(getattr(physics, key))}: {text}")]
+
+
+def external_issues(found: dict[str, Section]) -> list[Issue]:
+    """A field that cannot act in this box, and a conductivity that is none for its equilibrium."""
+    if not {"problem", "physics"} <= found.keys() or found["physics"].external is None:
+        return []
+    physics, issues = found["physics"], []
+    if misfit := physics.external_model().misfit(found["problem"].boundaries):
+        issues.append(Issue(("physics", "external"), f"= {value_text(physics.external)}: {misfit}"))
+    conductivity = physics.conductivity_model()
+    if conductivity is not None and not conductivity.suits_gravity:
+        text = (
+            f"= {value_text(physics.conductivity)}: expected none that acts where pressure varies "
+            'in equilibrium, as it does with physics.external. Try: "approach"'
+        )
+        issues.append(Issue(("physics", "conductivity"), text))
+    return issues
+
+
+def pairing_issues(found: dict[str, Section]) -> list[Issue]:
+    """A kernel whose particles pair at this eta, unless the user allows pairing."""
+    if not {"problem", "physics"} <= found.keys() or found["physics"].allow_pairing:
+        return []
+    physics, dimension = found["physics"], found["problem"].dimension
+    limit = getattr(physics.kernel_model(), "pairs_above", {}).get(dimension, math.inf)
+    if physics.eta <= limit:
+        return []
+    text = (
+        f"= {value_text(physics.kernel)}: in {dimension}-D its particles pair where physics.eta "
+        f"is above {limit:g}, and it is {physics.eta:g}; take a smaller physics.eta or a Wendland "
+        "kernel, or set physics.allow_pairing = true"
+    )
+    return [Issue(("physics", "kernel"), text)]
 
 
 def output_issues(found: dict[str, Section]) -> list[Issue]:

@@ -6,8 +6,10 @@ from typing import Any
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
+from sph.config import restarts
 from sph.config.errors import branches, describe, field_annotation
 from sph.config.toml_text import value_text
+from sph.docstrings import docstring
 
 
 def text(sections: dict[str, BaseModel]) -> str:
@@ -18,10 +20,10 @@ def text(sections: dict[str, BaseModel]) -> str:
 def _table(name: str, section: BaseModel) -> str:
     model = type(section)
     keys = (
-        _key(key, field, _help(model, key), getattr(section, key))
+        _key(key, field, _help(model, key), getattr(section, key), _restart(model, key))
         for key, field in model.model_fields.items()
     )
-    summary = _comment((model.__doc__ or "").partition("\n\n")[0])
+    summary = _comment(docstring(model).partition("\n\n")[0])
     return f"{summary}[{name}]\n\n" + "\n".join(keys)
 
 
@@ -31,7 +33,12 @@ def _help(model: type[BaseModel], key: str) -> str:
     return next((field.description for field in fields if field and field.description), key)
 
 
-def _key(key: str, field: FieldInfo, sentence: str, value: Any) -> str:
+def _restart(model: type[BaseModel], key: str) -> str:
+    """The key's class in a restart, where not all keys of its table have the same."""
+    return "" if model.restart else f"in a restart: {restarts.class_of(model, key)}"
+
+
+def _key(key: str, field: FieldInfo, sentence: str, value: Any, restart: str) -> str:
     annotation = field_annotation(field)
     shown = value.model_dump(exclude_none=True) if isinstance(value, BaseModel) else value
     default = "" if shown is None else f"default {value_text(shown)}"
@@ -39,6 +46,7 @@ def _key(key: str, field: FieldInfo, sentence: str, value: Any) -> str:
     fits = default and len(kind) + len(default) < 90
     lines = [f"{kind}; {default}"] if fits else [kind, default]
     above = _comment(sentence) + "".join(_comment(f"  {line}") for line in lines)
+    above += _comment(f"  {restart}") if restart else ""
     entries = "".join(_entries(branch) for branch in branches(annotation))
     return above + entries + _line(key, field, shown)
 

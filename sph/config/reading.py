@@ -121,9 +121,16 @@ def _set(source: Source, override: str) -> None:
 
 
 def resolve(
-    source: Source, overrides: Sequence[str], sections: dict[str, type[Section]]
+    source: Source,
+    overrides: Sequence[str],
+    sections: dict[str, type[Section]],
+    recorded: bool = False,
 ) -> dict[str, Section]:
-    """The valid tables by name. Raises ConfigError with one line for each thing wrong."""
+    """The valid tables by name. Raises ConfigError with one line for each thing wrong.
+
+    recorded: the source describes a run that exists, which stays readable where a new run with its
+    settings would be refused.
+    """
     for override in overrides:
         _set(source, override)
     models: dict[str, type[Section]] = {"problem": Problem, **sections}
@@ -133,6 +140,7 @@ def resolve(
     if problem is not None:
         models["problem"] = problem
         _fill_defaults(raw, problem)
+        _fill_tables(raw["problem"], source, problem)
         issues += checks.shape_issues(raw["problem"], problem)
     issues += not_finite(raw)
     found = {}
@@ -147,6 +155,9 @@ def resolve(
             elsewhere = _tables_of_keys(models, besides=name)
             issues += explain(model, raw[name], details, name, elsewhere)
     issues += checks.gas_issues(found)
+    issues += checks.external_issues(found)
+    if not recorded:
+        issues += checks.pairing_issues(found)
     issues += checks.output_issues(found)
     if issues:
         raise ConfigError("\n".join(_reports(source, issues)))
@@ -227,6 +238,18 @@ def _fill_defaults(raw: dict[str, dict[str, Any]], problem: type[Problem]) -> No
         table, name = key.split(".", 1)
         if _IN_PLACE_OF.get(key) not in raw[table]:
             raw[table].setdefault(name, value)
-    for name, field in problem.model_fields.items():  # a table in part keeps the rest of it
-        if isinstance(field.default, Section) and isinstance(raw["problem"].get(name), dict):
-            raw["problem"][name] = {**field.default.model_dump(), **raw["problem"][name]}
+
+
+def _fill_tables(raw: dict[str, Any], source: Source, problem: type[Problem]) -> None:
+    """Put a table's default under members of it that --set gives alone, as in any other table.
+
+    A table that is given itself must be complete: half of a gas is not that of another tube.
+    """
+    for name, field in problem.model_fields.items():
+        path = ("problem", name)
+        whole = any(
+            place[:2] == path and (place == path or isinstance(where, int))
+            for place, where in source.places.items()
+        )
+        if isinstance(field.default, Section) and isinstance(raw.get(name), dict) and not whole:
+            raw[name] = {**field.default.model_dump(), **raw[name]}

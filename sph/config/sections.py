@@ -1,13 +1,14 @@
 """The tables beside [problem]: every key once, with its type, bounds, default and help."""
 
 import os
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import AfterValidator, Field, model_validator
 
 from sph import registry
 from sph.config.choices import Choice, Gamma, ModelChoice
 from sph.config.errors import Issue, as_error
+from sph.config.restarts import FREE, RECORDED, REFUSED, SAME_KIND
 from sph.config.toml_text import value_text
 from sph.problems.base import Section
 
@@ -59,70 +60,103 @@ class Physics(Section):
     """The equations that are solved, in code units."""
 
     scheme: Annotated[str, Choice("sph.schemes")] = Field(
-        "grad_h", description="how density and rates are summed over neighbours"
+        "grad_h",
+        description="how density and rates are summed over neighbours",
+        json_schema_extra=RECORDED,
     )
     kernel: Annotated[Any, ModelChoice("sph.kernels")] = Field(
-        "wendland_c2", description="smoothing kernel"
+        "wendland_c2",
+        description="smoothing kernel",
+        json_schema_extra=RECORDED,
     )
     density: Literal["mass", "number"] = Field(
         "mass",
         description='what a density sums: the "mass" of neighbours, or the "number" of them, which '
         "the particle's own mass then multiplies: for masses that jump, the same where they do not",
+        json_schema_extra=RECORDED,
     )
     gamma: Gamma | None = Field(
-        1.4, description="adiabatic index of an ideal gas, the ratio of specific heats"
+        1.4,
+        description="adiabatic index of an ideal gas, the ratio of specific heats",
+        json_schema_extra=REFUSED,
     )
     eos: Annotated[Any, ModelChoice("sph.eos")] | None = Field(
         None,
         description="equation of state, in place of gamma",
         examples=[{"name": "ideal_gas", "gamma": 1.4}],
+        json_schema_extra=REFUSED,
     )
     alpha: AtLeastZero | AlphaRange = Field(
         1.0,
         description="artificial viscosity: one coefficient for all, or a range to switch it",
+        json_schema_extra=SAME_KIND,
     )
     conductivity: Annotated[Any, ModelChoice("sph.conductivity")] | None = Field(
         None,
         description="artificial conductivity, which smooths contacts, at these only if switched; "
         "none if not given",
         examples=[{"name": "pressure_jump", "strength": 1.0, "switched": True}],
+        json_schema_extra=RECORDED,
     )
     external: Annotated[Any, ModelChoice("sph.external")] | None = Field(
         None,
         description="field that pulls the gas from outside, with G = 1; none if not given",
         examples=[{"name": "point_mass", "mass": 1.0}],
+        json_schema_extra=REFUSED,
     )
     heating: Annotated[Any, ModelChoice("sph.heating")] | None = Field(
         None,
         description="source of internal energy other than the flow; none if not given",
         examples=[{"name": "relaxation", "energy": 1.0, "time": 0.1}],
+        json_schema_extra=SAME_KIND,
     )
     eta: float = Field(
-        1.6, gt=0, description="smoothing length in units of the local particle spacing"
+        1.6,
+        gt=0,
+        description="smoothing length in units of the local particle spacing",
+        json_schema_extra=RECORDED,
+    )
+    allow_pairing: bool = Field(
+        False,
+        description="run a spline kernel also at an eta at which its particles pair",
+        json_schema_extra=RECORDED,
     )
     max_support: float = Field(
         1.0,
         gt=0,
         description="where all axes are open, the widest a kernel may get where particles are too "
         "few to fill it, in units of the longest side of the domain",
+        json_schema_extra=RECORDED,
     )
     C: float = Field(
-        0.15, gt=0, description="Courant number: the time step in units of the stable one"
+        0.15,
+        gt=0,
+        description="Courant number: the time step in units of support over signal speed; held "
+        "where the leapfrog is stable with physics.alpha and physics.conductivity",
+        json_schema_extra=RECORDED,
     )
     balsara: bool = Field(
         True,
         description="less viscosity where the flow shears or rotates; in 1-D, where nothing "
         "rotates, only where |div v| is below 1e-4 c/H",
+        json_schema_extra=RECORDED,
     )
     density_passes: Passes | Literal["converged"] = Field(
-        2, description="passes of the density and smoothing length iteration in a step"
+        2,
+        description="passes of the density and smoothing length iteration in a step",
+        json_schema_extra=RECORDED,
     )
     energy_limit: bool = Field(
-        True, description="limit the time step by u / |du/dt| so that heating is resolved"
+        True,
+        description="limit the time step by u / |du/dt| so that heating is resolved",
+        json_schema_extra=RECORDED,
     )
 
     max_energy_drift: float = Field(
-        0.02, gt=0, description="the run stops where total energy is off by more than this part"
+        0.005,
+        gt=0,
+        description="the run stops where total energy is off by more than this part",
+        json_schema_extra=FREE,
     )
 
     @model_validator(mode="before")
@@ -183,12 +217,14 @@ def _named(model: str | dict[str, Any]) -> dict[str, Any]:
 class Time(Section):
     """How long the run goes on, in code units."""
 
+    restart: ClassVar[str | None] = "free"
     end: float = Field(gt=0, description="time at which the run ends; it starts at 0")
 
 
 class Output(Section):
     """What a run leaves behind."""
 
+    restart: ClassVar[str | None] = "free"
     interval: float = Field(gt=0, description="time between checkpoints, in code units")
 
 
@@ -199,6 +235,7 @@ def _absolute(path: str) -> str:
 class Report(Section):
     """What a run tells of itself when it has ended."""
 
+    restart: ClassVar[str | None] = "free"
     reference: Annotated[str, AfterValidator(_absolute)] = Field(
         "",
         description="directory of a finer run of the same problem, against which errors are taken "
@@ -210,6 +247,7 @@ class Report(Section):
 class Run(Section):
     """How the run is carried out; none of it changes a result."""
 
+    restart: ClassVar[str | None] = "free"
     threads: Count | Literal["all"] = Field(
         "all", description='processor threads; "all" uses every one there is'
     )

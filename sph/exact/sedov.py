@@ -21,6 +21,9 @@ import numpy as np
 # The smallest lambda told apart from the centre, so that its logarithm stays finite.
 SMALLEST_LAMBDA = 1e-250
 
+# gamma from which on a blast in 3-D has no gas at its centre, which these formulas do not describe.
+HOLLOW = 7.0
+
 
 class _Interior(NamedTuple):
     """At given y: logarithms of lambda and of density over that at the shock, and the rest."""
@@ -44,8 +47,8 @@ def shock_radius(energy: float, density: float, gamma: float, dimension: int, ti
     """R = (E t^2 / (a rho))^(1/(D+2)), with a from the energy integral of the exact interior.
 
     Raises ValueError for a parameter that is not positive, a gamma that is not above 1, a dimension
-    other than 1, 2 or 3, and for gamma >= 7 in 3-D, where the interior is no longer the standard
-    case (it becomes hollow).
+    other than 1, 2 or 3, and for gamma >= HOLLOW in 3-D, where the interior is no longer the
+    standard case (it becomes hollow).
     """
     _check(gamma, dimension, energy=energy, density=density, time=time)
     return (energy * time**2 / (_energy_factor(gamma, dimension) * density)) ** (
@@ -104,8 +107,10 @@ def _check(gamma: float, dimension: int, **positive: float) -> None:
         raise ValueError(f"dimension must be 1, 2 or 3, not {dimension}")
     if not (math.isfinite(gamma) and gamma > 1.0):
         raise ValueError(f"gamma must be a finite number above 1, not {gamma}")
-    if dimension == 3 and gamma >= 7.0:
-        raise ValueError(f"in 3-D gamma must be below 7, where the blast turns hollow, not {gamma}")
+    if dimension == 3 and gamma >= HOLLOW:
+        raise ValueError(
+            f"in 3-D gamma must be below {HOLLOW:g}, where the blast turns hollow, not {gamma}"
+        )
     for name, value in positive.items():
         if not (math.isfinite(value) and value > 0.0):
             raise ValueError(f"{name} must be a finite positive number, not {value}")

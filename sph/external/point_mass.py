@@ -23,5 +23,14 @@ class PointMass(NamedTuple):
         with np.errstate(divide="ignore"):
             return -self.mass / np.sqrt(self._softened(position))
 
+    def misfit(self, boundaries):
+        if "periodic" in boundaries:
+            return (
+                "the mass has no periodic images, so a particle that crosses a periodic face jumps "
+                "in its potential and total energy with it; expected no periodic axis. Try: "
+                'problem.boundary = "open" or "mirror", or another problem'
+            )
+        return None
+
     def _softened(self, position):
         return (position**2).sum(axis=0) + self.softening**2

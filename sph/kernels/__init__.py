@@ -8,6 +8,9 @@ without the normalisation C, which a loop applies once a particle.
     w(dim, q)               w(q) / C, zero for q >= 1
     dw_over_q(dim, q)       (dw/dq) / (q C): finite at q = 0 where the kernel is smooth
     force_over_q(dim, q)    the same, as it enters the pair force (eqs 22-23)
+
+and, where its particles pair at large eta, the attribute `pairs_above`: by dimension, the largest
+eta at which the particles of uniform gas stay apart (docs/measurements.md, section "Pairing").
 """
 
 import numpy as np

@@ -14,6 +14,11 @@ class CubicSpline(NamedTuple):
 
     flattened: bool = False
 
+    @property
+    def pairs_above(self) -> dict[int, float]:
+        # with the flattened gradient particles stay .77 of a spacing apart at least
+        return {} if self.flattened else {2: 1.4, 3: 1.2}
+
     def normalisation(self, dim):
         if len(dim) == 1:
             return 4 / 3

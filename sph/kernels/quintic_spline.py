@@ -1,9 +1,10 @@
 """Quintic B-spline kernel (Schoenberg 1946; Morris 1996).
 
-It pays in smooth flow at eta up to about 1.5 in 3-D, beyond which particles pair.
+It pays in smooth flow, at eta below `pairs_above`.
 """
 
 import math
+from types import MappingProxyType
 from typing import NamedTuple
 
 from sph.compiled import larger
@@ -11,6 +12,8 @@ from sph.compiled import larger
 
 class QuinticSpline(NamedTuple):
     """No parameters."""
+
+    pairs_above = MappingProxyType({2: 1.8, 3: 1.6})
 
     def normalisation(self, dim):
         if len(dim) == 1:

@@ -14,7 +14,8 @@ from sph.neighbours.order import BLOCK, number_of_blocks
 from sph.threads import SMALLEST_RANGE
 
 CHUNK = 32  # blocks that share a stretch of the storage
-IMAGE_SHIFT = 26  # low bits of a candidate: the particle; above them the image (27 at most)
+IMAGE_SHIFT = 26  # low bits of a candidate: the particle; above them the image
+SHORT_IMAGES = 1 << (31 - IMAGE_SHIFT)  # with so many images a candidate fits into 32 bits
 MAX_PARTICLES = 1 << IMAGE_SHIFT
 
 
@@ -23,7 +24,7 @@ class Lists(NamedTuple):
 
     start: np.ndarray  # (blocks,) int64
     count: np.ndarray  # (blocks,) int64
-    candidates: np.ndarray  # int32
+    candidates: np.ndarray  # int32, int64 where supports are wider than a thin box
 
 
 @njit(**COMPILED)
@@ -143,7 +144,8 @@ def build(tree, position, support, skin: float, images, team, room=None):
     while True:
         # 15 % to spare: lists rebuilt in a developing flow then rarely have to be built twice
         region = np.concatenate([[0], np.cumsum(room + room // 7 + 64)])
-        candidates = np.empty(region[-1], np.int32)
+        kind = np.int32 if images.sign.shape[0] <= SHORT_IMAGES else np.int64
+        candidates = np.empty(region[-1], kind)
         team.run(
             _fill_chunks, chunks, dim, tree, position, support, 1.0 + skin, images, region, start,
             count, candidates, needed, smallest=SMALLEST_RANGE // CHUNK,

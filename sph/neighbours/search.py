@@ -79,6 +79,7 @@ class Search:
         self.team = team
         self.origin = None
         self.lists = None
+        self.images = None  # that the lists refer to
         self._room = None
         self.reach_factor = 0.0  # of the list support: within it candidates are complete
         self._widenings = 0  # of this step
@@ -120,11 +121,12 @@ class Search:
     def build(self, origin: Origin, identity) -> None:
         """Build the lists from `origin`, whose arrays are in block order and are kept."""
         largest = int(np.argmax(origin.support))
-        self.domain.check_reach((1 + origin.skin) * origin.support[largest], int(identity[largest]))
+        self.domain.check_reach(origin.support[largest], identity.size, int(identity[largest]))
+        self.images = self.domain.images_within((1 + origin.skin) * origin.support[largest])
         boxes = tree.build(origin.position, origin.support)
         self.lists = None  # the old ones, the largest arrays there are, make room for the new
         self.lists, self._room = lists.build(
-            boxes, origin.position, origin.support, origin.skin, self.domain.images, self.team,
+            boxes, origin.position, origin.support, origin.skin, self.images, self.team,
             self._room,
         )  # fmt: skip
         self.origin = origin
@@ -136,8 +138,5 @@ class Search:
         factor = np.repeat(np.maximum(wanted, 1.0), BLOCK)[: identity.size]
         support = self.origin.support * factor
         if self._widenings > PATIENCE:
-            room = self.domain.longest_reach / (1 + self.origin.skin)
-            support = np.where(
-                factor > 1.0, np.maximum(support, np.minimum(2.0 * support, room)), support
-            )
+            support = np.where(factor > 1.0, 2.0 * support, support)
         self.build(Origin(position.copy(), support, self.origin.skin), identity)

@@ -21,6 +21,7 @@ import h5py
 import numpy as np
 
 from sph import config as configuration
+from sph import fingerprint
 from sph.errors import ConfigError, FileError
 from sph.output import layout, stored, validity
 from sph.output.files import Damaged, PatientFile, is_sealed, opened, replacing, seal
@@ -52,6 +53,7 @@ class Checkpoint:
     list_skin: float  # their skin, as a fraction of H
     config: configuration.Config
     lineage: tuple[str, ...]  # the runs it came from, oldest first
+    computed_by: str | None = None  # of one that was read: `fingerprint.as_json` of its writer
 
     @property
     def pressure(self) -> np.ndarray:
@@ -103,6 +105,7 @@ def read(path: Path) -> Checkpoint:
     _check_hashes(path, state, texts)
     config = _config(path, texts["configuration"])
     checkpoint = _checkpoint(state, config, _lineage(path, texts["lineage"]))
+    checkpoint.computed_by = texts.get("computed_by")
     _check_state(path, checkpoint)
     return checkpoint
 
@@ -136,6 +139,7 @@ def _write_private(group: h5py.Group, checkpoint: Checkpoint, state, digest) -> 
             "configuration_sha256": _text_hash(text),
             "machine": f"{platform.machine()} {sys.byteorder}-endian",
             "versions": _versions(),
+            "computed_by": fingerprint.as_json(),
         }
     )
 

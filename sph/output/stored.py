@@ -32,6 +32,7 @@ AXES = {
 }
 INTEGERS = ("id", "step")
 TEXTS = ("configuration", "lineage", "sha256", "configuration_sha256")
+LATER_TEXTS = ("computed_by",)  # which the first files did not have
 
 # What h5py raises on a damaged file, by where in it the damage is.
 DAMAGE = (OSError, RuntimeError, KeyError, ValueError, TypeError, AttributeError)
@@ -65,7 +66,8 @@ def load(file: io.FileIO, version: int) -> tuple[dict[str, np.ndarray], dict[str
                 _check(name, dataset, size)
             if sum(one.nbytes for one in datasets.values()) > size:
                 raise Refused("foreign", "its datasets are larger than the file")
-            texts = {name: _attribute(group, name, str) for name in TEXTS}
+            later = [one for one in LATER_TEXTS if h5py.h5a.exists(group.id, one.encode())]
+            texts = {name: _attribute(group, name, str) for name in (*TEXTS, *later)}
             return {name: dataset[()] for name, dataset in datasets.items()}, texts
     except DAMAGE as error:
         raise Refused("damaged", str(error)) from error

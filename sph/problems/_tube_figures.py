@@ -28,11 +28,10 @@ class Tube(NamedTuple):
 
 
 def of(tube: Tube) -> dict[str, float]:
-    """The figures of `Problem.report`, of those that this solution has."""
+    """The figures of `Problem.compare`, of those that this solution has."""
     star = riemann.star_state(*tube.states, tube.eos)
     speed = riemann.wave_speeds(*tube.states, tube.eos)
     figures = {
-        "peak_density": float(tube.density[tube.region].max(initial=0.0)),
         "peak_density_exact": max(
             *(state.density for state in tube.states), star.density_left, star.density_right
         ),

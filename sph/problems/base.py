@@ -1,5 +1,6 @@
 """What every problem has: shared keys, and the questions the program asks of a problem."""
 
+import math
 from typing import Any, ClassVar, Literal, NamedTuple
 
 import numpy as np
@@ -33,7 +34,12 @@ class Limit(NamedTuple):
 
 
 class Section(BaseModel):
-    """A table of the configuration: strict about types and unknown keys, immutable once read."""
+    """A table of the configuration: strict about types and unknown keys, immutable once read.
+
+    restart: the class of its keys in a restart (`sph.config.restarts`), unless a key has its own.
+    """
+
+    restart: ClassVar[str | None] = None
 
     model_config = ConfigDict(extra="forbid", strict=True, frozen=True, validate_default=True)
 
@@ -52,6 +58,7 @@ class Problem(Section):
       profiled   whether profiles over x, or that distance, show the solution; maps do else
     """
 
+    restart: ClassVar[str | None] = "refused"
     defaults: ClassVar[dict[str, Any]] = {}
     limits: ClassVar[dict[str, Limit]] = {}
     ideal_gas: ClassVar[bool] = False
@@ -93,13 +100,39 @@ class Problem(Section):
         """The limits that a run of this very configuration must keep, or its summary warns."""
         return self.limits
 
+    @property
+    def gamma_below(self) -> float:
+        """What gamma must stay below for the problem to have its solution."""
+        return math.inf
+
     def initial(self, eos) -> InitialState:
         """The particles at t = 0 for that equation of state."""
         raise NotImplementedError
 
     def exact(self, eos, time: float, position: np.ndarray) -> dict[str, np.ndarray] | None:
-        """Exact density, velocity (D, N), pressure, internal_energy at (D, N) points, or None."""
+        """Exact density, velocity (D, N), pressure, internal_energy at (D, N) points, or None.
+
+        Callers ask `sph.analysis.truth` first, which knows where it does not hold.
+        """
         return None
+
+    def departs(self, physics) -> str | None:
+        """Why this physics is not that of the exact solution and of the theory, or None.
+
+        physics: the table of that name of the configuration.
+        """
+        return other_physics(physics, "external", "heating")
+
+    def exact_ends(self, eos) -> tuple[float, str]:
+        """The time until which `exact` holds, and what ends it: the words after "when"."""
+        return math.inf, ""
+
+    def undisturbed(self, eos, time: float) -> np.ndarray:
+        """(D, 2): between which ends along each axis no wave from the domain's ends has come.
+
+        Infinite along an axis whose ends send none. `exact` holds there alone.
+        """
+        return np.tile([-math.inf, math.inf], (self.dimension, 1))
 
     def error_region(self, eos, time: float, position: np.ndarray) -> tuple[np.ndarray, str]:
         """(N,) mask of the particles over which errors are taken, and that region in words."""
@@ -110,13 +143,31 @@ class Problem(Section):
         return {}
 
     def report(self, eos, time: float, particles, pressure) -> dict[str, float]:
-        """Further figures of the summary at the end of a run, e.g. a shock's radius."""
+        """Further figures of the summary at the end of a run that need no exact solution."""
+        return {}
+
+    def compare(self, eos, time: float, particles, pressure) -> dict[str, float]:
+        """Figures beside the exact solution, or beside theory: asked for where these hold alone."""
         return {}
 
     def theory(self, eos, times: np.ndarray) -> dict[str, np.ndarray]:
-        """What theory says of columns of the history at `times` (M,), rising: drawn beside them."""
+        """What theory says of columns of the history at `times` (M,), rising: drawn beside them.
+
+        Asked for where the physics does not depart from that of the theory alone.
+        """
         return {}
 
     def over_time(self, eos, history: dict[str, np.ndarray]) -> dict[str, float]:
-        """The same from the whole history, whose columns are (steps,), e.g. when a mode peaked."""
+        """Figures from the whole history, whose columns are (steps,), e.g. a rate of growth.
+
+        Asked for where the physics does not depart from that of the theory alone.
+        """
         return {}
+
+
+def other_physics(physics, *keys: str) -> str | None:
+    """That the first of the keys of [physics] that is given is not in the exact solution."""
+    for key in keys:
+        if getattr(physics, key) is not None:
+            return f"the exact solution is that of gas without physics.{key}"
+    return None

@@ -98,7 +98,7 @@ class Problem(base.Problem):
         return base.InitialState(position, state["velocity"], each, state["internal_energy"])
 
     def exact(self, eos, time: float, position: np.ndarray) -> dict[str, np.ndarray] | None:
-        """The initial state, at (D, N) positions; None later, when nobody knows it."""
+        """The initial state, at (D, N) positions; None later, when there is no exact solution."""
         if time > 0.0:
             return None
         in_cloud = self._distance(position) < self.radius

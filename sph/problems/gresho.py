@@ -97,7 +97,7 @@ class Problem(base.Problem):
             "internal_energy": eos.internal_energy(density, pressure),
         }
 
-    def report(self, eos, time: float, particles, pressure) -> dict[str, float]:
+    def compare(self, eos, time: float, particles, pressure) -> dict[str, float]:
         """How well the rotation was kept, all volume-weighted and over the whole box.
 
         error_v_phi: mean |v_phi - exact|; peak_v_phi: the largest mean v_phi of rings one spacing

@@ -10,6 +10,7 @@ from typing import Annotated, ClassVar, Literal
 import numpy as np
 from pydantic import Field, model_validator
 
+from sph.external.point_mass import PointMass
 from sph.problems import base
 
 _SHARED = base.Problem.model_fields
@@ -20,6 +21,7 @@ DENSITY = 1.0
 # ends that nothing holds, EDGE of the width on either side, are left out.
 DENSITY_BOUND, RADIUS_BOUND = 0.1, 0.02
 EDGE = 0.15
+ORBITED = PointMass(mass=1.0, softening=0.0)
 
 
 class Problem(base.Problem):
@@ -80,6 +82,19 @@ class Problem(base.Problem):
             "pressure": pressure,
             "internal_energy": eos.internal_energy(density, pressure),
         }
+
+    def departs(self, physics) -> str | None:
+        if physics.external_model() != ORBITED:
+            return (
+                "the exact orbits are those about a point mass of 1 without softening, and "
+                "physics.external is another field"
+            )
+        return base.other_physics(physics, "heating")
+
+    def exact_ends(self, eos) -> tuple[float, str]:
+        """When sound has come from the edges, which expand, to the gas that errors are taken of."""
+        sound = float(eos.sound_speed(DENSITY, self.pressure))
+        return EDGE * self.width / sound, "waves from the ring's edges reach its inner part"
 
     def error_region(self, eos, time: float, position: np.ndarray) -> tuple[np.ndarray, str]:
         """The ring but for its edges."""

@@ -3,6 +3,7 @@
 Sod (1978), J. Comput. Phys. 27, 1, for the best-known states; any others, along x, in 1 to 3-D.
 """
 
+import math
 from typing import Annotated, ClassVar, Literal, NamedTuple
 
 import numpy as np
@@ -11,7 +12,7 @@ from pydantic import Field, field_validator, model_validator
 from sph import lattice as placement
 from sph.eos import is_gamma_law
 from sph.exact import riemann
-from sph.problems import _tube_figures, base
+from sph.problems import _ends, _tube_figures, base
 
 _SHARED = base.Problem.model_fields
 
@@ -87,7 +88,7 @@ class Problem(base.Problem):
         min_length=2,
         max_length=2,
         description="[lo, hi]: errors are taken over this range of x only; the whole domain if not "
-        "given. On a periodic x the ends meet in a second discontinuity: leave its waves out",
+        "given. Gas that waves from the ends of x have reached is left out in any case",
     )
 
     @field_validator("lattice")
@@ -183,10 +184,40 @@ class Problem(base.Problem):
         low, high = self.error_range
         return (low < position[0]) & (position[0] < high), f"{low:g} < x < {high:g}"
 
+    def undisturbed(self, eos, time: float) -> np.ndarray:
+        found = super().undisturbed(eos, time)
+        found[0] = self._ends(eos).between(self.box[0], time)
+        return found
+
+    def exact_ends(self, eos) -> tuple[float, str]:
+        """When a wave from the diaphragm reaches a wall, or meets one from an end."""
+        states = self._states()
+        if states[0] == states[1] or not is_gamma_law(eos):
+            return math.inf, ""
+        for axis, kind in zip("yz", self.boundaries[1:], strict=False):
+            if kind == "open":
+                return 0.0, f"gas begins to leave through the open ends along {axis}"
+        ends, found = self._ends(eos), (math.inf, "")
+        waves = riemann.reach(*states, eos)
+        for end, from_end, wave in zip(self.box[0], ends, waves, strict=True):
+            speed = from_end if math.isfinite(from_end) else 0.0  # no wave before the tube's own
+            # over the way along +-x, by which both come nearer
+            closing = (speed - wave) * (1.0 if end < self.discontinuity else -1.0)
+            time = abs(end - self.discontinuity) / closing if closing > 0.0 else math.inf
+            if time < found[0]:
+                meets = "meets that from" if math.isfinite(from_end) else "reaches"
+                found = time, f"the wave from the diaphragm {meets} the end at x = {end:g}"
+        return found
+
     def report(self, eos, time: float, particles, pressure) -> dict[str, float]:
+        """peak_density: the highest in `error_range`."""
+        region, _ = self.error_region(eos, time, particles.position)
+        return {"peak_density": float(particles.density[region].max(initial=0.0))}
+
+    def compare(self, eos, time: float, particles, pressure) -> dict[str, float]:
         """What the profile shows beside the exact one, over the region of the errors.
 
-        peak_density; density_L1_relative: sum V |error| over sum V exact; plateau_*: the median of
+        density_L1_relative: sum V |error| over sum V exact; plateau_*: the median of
         each star state over exact, minus 1 (of velocity, over its change); shock_left_error and
         shock_right_error: way that a shock has run in the gas ahead over exact, minus 1;
         contact_energy_excess: the largest u over exact between the outer waves, minus 1, which is
@@ -196,6 +227,8 @@ class Problem(base.Problem):
         if exact is None:
             return {}
         region, _ = self.error_region(eos, time, particles.position)
+        low, high = self.undisturbed(eos, time)[0]
+        region &= (low < particles.position[0]) & (particles.position[0] < high)
         return _tube_figures.of(
             _tube_figures.Tube(
                 self._states(), eos, time, particles.position[0] - self.discontinuity, region,
@@ -209,6 +242,10 @@ class Problem(base.Problem):
             riemann.State(gas.density, gas.velocity, gas.pressure)
             for gas in (self.left, self.right)
         )
+
+    def _ends(self, eos) -> _ends.Ends:
+        """The waves from the ends of x."""
+        return _ends.of(self.boundaries[0], *self._states(), eos)
 
     def _undisturbed(self, position: np.ndarray) -> riemann.State:
         """Density, velocity along x and pressure (N,) at t = 0."""

@@ -98,6 +98,20 @@ class Problem(base.Problem):
             "internal_energy": eos.internal_energy(density, pressure),
         }
 
+    def exact_ends(self, eos) -> tuple[float, str]:
+        """When a wave of the flow meets one from an end, both as in `error_region`.
+
+        The shock runs at Mach 3 into gas of density 1, and at hardly another speed on the mean of
+        the sine; behind it, the sound that it sends back is slower than the gas.
+        """
+        (low, high), sound = self.box[0], float(eos.sound_speed(DENSITY, PRESSURE))
+        at_low = (DIAPHRAGM - low) / (2.0 * sound)
+        shock = 3.0 * float(eos.sound_speed(1.0, AHEAD_PRESSURE))
+        ahead = float(eos.sound_speed(LEAST_DENSITY, AHEAD_PRESSURE))
+        at_high = (high - DIAPHRAGM) / (shock + ahead)
+        end = low if at_low < at_high else high
+        return min(at_low, at_high), f"waves from the end at x = {end:g} meet those of the flow"
+
     def error_region(self, eos, time: float, position: np.ndarray) -> tuple[np.ndarray, str]:
         """Where no wave from the ends of the box has come."""
         low, high = self.box[0]

@@ -1,12 +1,14 @@
 """Uniform gas at rest or in motion, on a lattice or with noise: nothing should happen."""
 
+import math
 from typing import Annotated, ClassVar, Literal
 
 import numpy as np
 from pydantic import Field, field_validator
 
 from sph import lattice as placement
-from sph.problems import base
+from sph.exact import riemann
+from sph.problems import _ends, base
 
 _SHARED = base.Problem.model_fields
 
@@ -83,11 +85,7 @@ class Problem(base.Problem):
         """The uniform state, at any (D, N) positions and for ever."""
         n = position.shape[1]
         density, pressure = np.full(n, self.density), np.full(n, self.pressure)
-        velocity = np.zeros_like(position)
-        if isinstance(self.velocity, list):
-            velocity += np.array(self.velocity)[:, None]
-        else:
-            velocity[0] = self.velocity
+        velocity = np.zeros_like(position) + self._velocity[:, None]
         return {
             "density": density,
             "velocity": velocity,
@@ -95,15 +93,47 @@ class Problem(base.Problem):
             "internal_energy": eos.internal_energy(density, pressure),
         }
 
-    def report(self, eos, time: float, particles, pressure) -> dict[str, float]:
-        """Largest over smallest of what is to stay uniform, minus 1, and how far it has come.
+    def undisturbed(self, eos, time: float) -> np.ndarray:
+        return np.array(
+            [ends.between(box, time) for ends, box in zip(self._ends(eos), self.box, strict=True)]
+        )
 
-        crossings: lengths of the box along x that the gas has moved.
-        """
-        speed = self.velocity[0] if isinstance(self.velocity, list) else self.velocity
+    def exact_ends(self, eos) -> tuple[float, str]:
+        """When the waves from both ends of an axis have met; never where none sends any."""
+        first = math.inf, ""
+        for axis, ends, (low, high) in zip("xyz", self._ends(eos), self.box, strict=False):
+            closing = ends.low - ends.high
+            if closing > 0.0 and (high - low) / closing < first[0]:
+                first = (high - low) / closing, f"waves from the domain's ends along {axis} meet"
+        return first
+
+    def report(self, eos, time: float, particles, pressure) -> dict[str, float]:
+        """Largest over smallest of what is to stay uniform, minus 1."""
         density, energy = particles.density, particles.internal_energy
         return {
             "density_spread": float(density.max() / density.min() - 1.0),
             "energy_spread": float(energy.max() / energy.min() - 1.0),
-            "crossings": abs(speed) * time / float(self.box[0, 1] - self.box[0, 0]),
         }
+
+    def compare(self, eos, time: float, particles, pressure) -> dict[str, float]:
+        """crossings: lengths of the box along x that the gas has moved."""
+        length = float(self.box[0, 1] - self.box[0, 0])
+        return {"crossings": float(abs(self._velocity[0]) * time / length)}
+
+    @property
+    def _velocity(self) -> np.ndarray:
+        """(D,) of the gas."""
+        velocity = np.zeros(self.dimension)
+        if isinstance(self.velocity, list):
+            velocity += self.velocity
+        else:
+            velocity[0] = self.velocity
+        return velocity
+
+    def _ends(self, eos) -> list[_ends.Ends]:
+        """The waves from the ends of each axis."""
+        gas = [riemann.State(self.density, float(v), self.pressure) for v in self._velocity]
+        return [
+            _ends.of(boundary, state, state, eos)
+            for boundary, state in zip(self.boundaries, gas, strict=True)
+        ]

@@ -37,7 +37,8 @@ class Found:
     scheme: str
     problem: str
     particles: int
-    end: float
+    end: float  # of the runs
+    whole_end: float  # of the configuration file
     judge: Judge
     edges: dict[str, Edge]  # by the name of the end
     trials: tuple[Trial, ...]  # by value
@@ -72,6 +73,7 @@ def run(
     resolved = trials.config
     return Found(
         config.stem, key, trials.default, resolved.physics.scheme, resolved.problem.name,
-        trials.judge.summary["particles"], resolved.time.end, trials.judge, edges,
+        trials.judge.summary["particles"], resolved.time.end, trials.whole_end,
+        trials.judge, edges,
         tuple(trials.done[value] for value in sorted(trials.done)),
     )  # fmt: skip

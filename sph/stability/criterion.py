@@ -1,4 +1,4 @@
-"""When a run is stable: by its status, its errors and its energy, beside a run of small steps."""
+"""When a run is stable: by its status, errors, energy and limits, beside a run of small steps."""
 
 import json
 from dataclasses import dataclass
@@ -27,10 +27,11 @@ class Criterion(NamedTuple):
     # the order of sums does, and well below what a run does that blows up.
     error_growth: float = 1.5
     # Without an exact solution: L1 of the difference from the reference, particle by particle, as
-    # a part of the field's mean size (of |v| + c_s for velocity).
+    # a part of the field's mean size (of |v| + c_s for velocity); and of each figure of the report,
+    # as a part of itself: a mode may be lost that is small beside the flow.
     deviation: float = 0.05
     # With an exact solution: errors below this part of the field's mean size do not count, however
-    # small the reference's are. The default is round-off.
+    # small the reference's are; nor do such differences of a figure. The default is round-off.
     negligible: float = 1e-9
     # Factor between the last stable and the first unstable value at which bisection ends.
     resolution: float = 1.1
@@ -63,6 +64,7 @@ class Trial:
     error: float  # the field nearest to its limit or farthest beyond, over that limit
     field: str  # which that is
     drift: float  # largest |E - E_0|/|E_0| at any step
+    time: float  # reached
     steps: int
     cpu: float  # seconds without compiling
 
@@ -74,8 +76,11 @@ class Trial:
 class Judge:
     """Judges runs beside a reference run of the same particles."""
 
-    def __init__(self, reference: Path, criterion: Criterion):
-        """Raises NumericalError where the reference itself came to no end, FileError."""
+    def __init__(self, reference: Path, criterion: Criterion, holds_report: bool = True):
+        """Raises NumericalError where the reference itself came to no end, FileError.
+
+        holds_report: whether figures of the report must be the reference's where nothing is exact.
+        """
         self.directory = reference
         self.summary = read_summary(reference)
         if self.summary["status"] != "done":
@@ -87,6 +92,10 @@ class Judge:
         self.criterion = criterion
         self.drift = self._largest_drift()
         self.errors = self._largest_errors()
+        self.figures = self._largest_figures()
+        self.report = {}
+        if holds_report and not self.has_exact:
+            self.report = self._numbers(self.summary)
 
     @property
     def has_exact(self) -> bool:
@@ -96,7 +105,7 @@ class Judge:
         """The trial whose run, ended, is in `directory`. Raises FileError."""
         summary = read_summary(directory)
         drift = float(summary["conservation"]["energy_drift_max"])
-        numbers = (drift, summary["steps"], _cpu(summary))
+        numbers = (drift, float(summary["time"]), summary["steps"], _cpu(summary))
         if summary["status"] == "failed":
             reason = first_line(summary["reason"])
             return Trial(value, directory.name, "failed", reason, NONE, "", *numbers)
@@ -108,6 +117,11 @@ class Judge:
             broken.append(f"the error of {field.replace('_', ' ')} is {error:.3g} of its limit")
         if not drift <= self.drift:
             broken.append(f"energy drifts by {drift:.2g}, more than {self.drift:.2g}")
+        for name, largest in self.figures.items():
+            own = _figure(summary, name)
+            if not own <= largest:
+                broken.append(f"{name.replace('_', ' ')} is {own:.3g}, more than {largest:.3g}")
+        broken += self._other_figures(summary)
         verdict = "beyond" if broken else "stable"
         return Trial(
             value, directory.name, verdict, " and ".join(broken), error, field, *numbers
@@ -121,10 +135,15 @@ class Judge:
                 f"C = {self._courant:g}"
             )
         else:
+            what = "fields and figures of the report" if self.report else "fields"
             errors = (
-                f"fields within {self.criterion.deviation:.0%} of the run at C = {self._courant:g}"
+                f"{what} within {self.criterion.deviation:.0%} of the run at C = {self._courant:g}"
             )
-        return f"it ends, {errors}, energy drift at most {self.drift:.2g}"
+        figures = "".join(
+            f", {name.replace('_', ' ')} at most {largest:.3g}"
+            for name, largest in self.figures.items()
+        )
+        return f"it ends, {errors}, energy drift at most {self.drift:.2g}{figures}"
 
     @property
     def _courant(self) -> float:
@@ -136,6 +155,32 @@ class Judge:
         bound = self.state.config.physics.max_energy_drift if limit is None else limit.bound
         own = float(self.summary["conservation"]["energy_drift_max"])
         return max(bound, self.criterion.error_growth * own)
+
+    def _largest_figures(self) -> dict[str, float]:
+        """The problem's other limits, or error_growth times what the reference has beyond one.
+
+        Without figures that the reference lacks, because it is too short for them.
+        """
+        found = {}
+        for name, limit in self.state.config.problem.limits.items():
+            own = _figure(self.summary, name)
+            if name != "energy_drift" and own == own:
+                keeps = own <= limit.bound
+                found[name] = limit.bound if keeps else self.criterion.error_growth * own
+        return found
+
+    def _other_figures(self, summary: dict) -> list[str]:
+        """Words for figures of the report that are not the reference's, where nothing is exact."""
+        found, figures, criterion = [], self._numbers(summary), self.criterion
+        for name, own in self.report.items():
+            value = figures.get(name, NONE)
+            if not abs(value - own) <= criterion.deviation * abs(own) + criterion.negligible:
+                found.append(f"{name.replace('_', ' ')} is {value:.3g}, the reference's {own:.3g}")
+        return found
+
+    @staticmethod
+    def _numbers(summary: dict) -> dict[str, float]:
+        return {name: float(value) for name, value in (summary["report"] or {}).items()}
 
     def _largest_errors(self) -> dict[str, float]:
         """The largest L1 error that a stable run has, by field."""
@@ -166,6 +211,13 @@ class Judge:
 def read_summary(directory: Path) -> dict:
     """The summary of a run that has ended; numbers that JSON has not are words for `float`."""
     return json.loads(RunDirectory(directory).summary.read_text(encoding="utf-8"))
+
+
+def _figure(summary: dict, name: str) -> float:
+    """A figure that `Problem.limits` names; NaN where the summary has none."""
+    figures = summary["conservation"] | (summary["report"] or {})
+    value = figures.get(name)
+    return NONE if value is None else float(value)
 
 
 def _last(directory: Path) -> Checkpoint:

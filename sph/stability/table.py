@@ -10,32 +10,46 @@ from sph.output.files import explained, write_text
 from sph.output.json_text import json_text, null
 from sph.stability.command import Found
 
-# Of a run at the limit, below which it hardly tells: an instability needs some tens to be seen.
+# Steps of a run at the limit, below which a slow instability would not show.
 FEW_STEPS = 30
 
-COLUMNS = ("value", "verdict", "error_over_limit", "field", "energy_drift", "steps", "cpu_seconds",
-           "name", "reason")  # fmt: skip
+COLUMNS = ("value", "verdict", "error_over_limit", "field", "energy_drift", "time", "steps",
+           "cpu_seconds", "name", "reason")  # fmt: skip
 
 
 def in_words(found: Found) -> str:
     """Where the ends are, how far the configuration is from them, and what happens there."""
     lines = [
-        f"{found.config}, {found.scheme}, {found.particles} particles to t = {found.end:g}; "
-        f"stable: {found.judge.in_words()}."
+        f"{found.config}, {found.scheme}, {found.particles} particles, runs to t = {found.end:g}"
+        f"{_what_was_not_run(found)}. A run is stable if {found.judge.in_words()}."
     ]
     for end in found.edges:
         lines.append(_of_an_end(found, end))
         inside = found.edges[end].inside
-        if inside is not None and found.at(inside).steps < FEW_STEPS:
-            lines.append(
-                f"  There a run has {found.at(inside).steps} steps, too few for an instability to "
-                "show: a larger time.end would tell more."
-            )
+        if inside is not None:
+            lines.append(_length(found, inside))
         if islands := found.islands(end):
             lines.append(
                 f"  It is not one range: stable again at {', '.join(f'{x:g}' for x in islands)}."
             )
     return "\n".join(lines)
+
+
+def _what_was_not_run(found: Found) -> str:
+    if found.end >= found.whole_end:
+        return ""
+    return f" of time.end = {found.whole_end:g}: the search says nothing of later times"
+
+
+def _length(found: Found, value: float) -> str:
+    """How long the last stable run was, and whether that is enough."""
+    steps = found.at(value).steps
+    said = f"  The run at {value:g} took {steps} steps"
+    if steps >= FEW_STEPS:
+        return f"{said}."
+    return (
+        f"{said}, fewer than the {FEW_STEPS} in which an instability shows. Try: a larger time.end."
+    )
 
 
 def margin(found: Found, end: str) -> float:
@@ -52,6 +66,7 @@ def as_json(found: Found) -> str:
         "scheme": found.scheme,
         "particles": found.particles,
         "end": found.end,
+        "whole_end": found.whole_end,
         "key": found.key,
         "default": found.default,
         "criterion": found.judge.criterion._asdict(),
@@ -60,6 +75,8 @@ def as_json(found: Found) -> str:
             "name": found.judge.directory.name,
             "largest_errors": found.judge.errors,
             "largest_drift": found.judge.drift,
+            "largest_figures": found.judge.figures,
+            "figures": found.judge.report,
             "against_exact": found.judge.has_exact,
         },
         "ends": {
@@ -86,8 +103,8 @@ def as_csv(found: Found) -> str:
     writer.writerow(COLUMNS)
     for one in found.trials:
         writer.writerow(
-            (one.value, one.verdict, one.error, one.field, one.drift, one.steps, one.cpu, one.name,
-             one.reason)
+            (one.value, one.verdict, one.error, one.field, one.drift, one.time, one.steps, one.cpu,
+             one.name, one.reason)
         )  # fmt: skip
     return text.getvalue()
 

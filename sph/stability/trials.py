@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from sph import config as configuration
-from sph.errors import FileError, NumericalError, Stopped, first_line
+from sph.errors import ConfigError, FileError, NumericalError, Stopped, first_line
 from sph.stability.criterion import NONE, Criterion, Judge, Trial
 from sph.sweep import local
 from sph.sweep.manifest import SweepDirectory
@@ -36,7 +36,8 @@ class Trials:
         (task,) = self._run([self._point(COURANT, courant)])
         if task.status is None:
             raise NumericalError(f"the reference run fails: {self._refused[task.point.name]}")
-        self.judge = Judge(task.run.path, criterion)
+        # a mode of few particles grows otherwise at another eta, which is no instability
+        self.judge = Judge(task.run.path, criterion, holds_report=key == COURANT)
         if key == COURANT:
             self.done[courant] = self.judge.trial(courant, task.run.path)
 
@@ -44,6 +45,15 @@ class Trials:
     def default(self) -> float:
         """The configuration's own value of the key."""
         return getattr(self.config.physics, self.key.partition(".")[2])
+
+    @property
+    def whole_end(self) -> float:
+        """time.end of the configuration file, which an override may have shortened."""
+        others = [one for one in self.overrides if not one.startswith("time.end")]
+        try:
+            return configuration.load(self.path, others).time.end
+        except ConfigError:  # the file has none of its own
+            return self.config.time.end
 
     def are_stable(self, values: Sequence[float]) -> list[bool]:
         """Whether runs at these values are, which are made where they are missing.
@@ -86,7 +96,7 @@ class Trials:
         if task.status is None:  # it said what is wrong before it made its first step
             name = task.point.name
             reason = first_line(self._refused[name])
-            return Trial(value, name, "failed", reason, NONE, "", NONE, 0, 0.0)
+            return Trial(value, name, "failed", reason, NONE, "", NONE, 0.0, 0, 0.0)
         return self.judge.trial(value, task.run.path)
 
     def _say(self, trial: Trial) -> None:

@@ -1,11 +1,13 @@
 """Figures of a run that limits are set on, each by a name of parts between dots.
 
-errors.FIELD.NORM          as the summary has them: against the exact solution
+errors.FIELD.NORM          as the summary has them: against the exact solution, where it holds
 relative.FIELD.NORM        the same, of (value - exact)/|exact| of each particle
 report.NAME                figures of the problem
+nearest.KIND               distance to the nearest neighbour, in spacings; KIND is median, smallest
 conservation.NAME, cost.NAME, steps, particles, time
 history.COLUMN.KIND        over all steps; KIND is first, last, min or max
 state.FIELD.KIND           over the particles at the end; KIND is min or max
+warnings.KIND              how many warnings of that kind the run ended with
 change.FIELD               largest |last - first| of a particle, over its own first value for
                            scalars, over the largest first length for vectors
 """
@@ -15,6 +17,8 @@ from pathlib import Path
 
 import numpy as np
 
+from sph import warnings
+from sph.analysis import truth
 from sph.analysis.errors import norms
 from sph.output import checkpoint as checkpoints
 from sph.output.checkpoint import Checkpoint
@@ -22,8 +26,8 @@ from sph.output.history import read as read_history
 from sph.output.run_directory import RunDirectory
 
 KINDS = (
-    "errors", "relative", "report", "conservation", "cost", "steps", "particles", "time",
-    "history", "state", "change",
+    "errors", "relative", "report", "nearest", "conservation", "cost", "steps", "particles",
+    "time", "history", "state", "change", "warnings",
 )  # fmt: skip
 NONE = float("nan")  # the value of a figure that a run does not have
 
@@ -43,7 +47,7 @@ class Figures:
         kind, *rest = name.split(".")
         makers = {
             "errors": self._error, "relative": self._relative, "history": self._of_history,
-            "state": self._of_state, "change": self._change,
+            "state": self._of_state, "change": self._change, "warnings": self._warnings,
         }  # fmt: skip
         try:
             return float(makers[kind](*rest) if kind in makers else self._said(kind, *rest))
@@ -68,6 +72,9 @@ class Figures:
             found = found[name]
         return found
 
+    def _warnings(self, kind: str):
+        return warnings.kinds(self.summary).count(kind)
+
     def _error(self, field: str, norm: str):
         return self._said("errors", "fields", field, norm)
 
@@ -86,8 +93,10 @@ class Figures:
     def _relative(self, field: str, norm: str):
         state, eos = self._last, self._last.config.physics.eos_model()
         problem, position = state.config.problem, state.particles.position
+        if truth.left_out(state.config, state.time, position):
+            return NONE
         exact = problem.exact(eos, state.time, position)[field]
-        inside, _ = problem.error_region(eos, state.time, position)
+        inside, _ = truth.region(problem, eos, state.time, position)
         with np.errstate(divide="ignore", invalid="ignore"):
             difference = (state.field(field) - exact) / np.abs(_length(exact))
         volume = state.particles.mass / state.particles.density

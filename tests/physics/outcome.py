@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from pathlib import Path
 
-from sph.analysis import errors
+from sph.analysis import errors, truth
 from sph.clock import Clock
 from sph.scene import Scene
 from sph.simulation import Simulation
@@ -34,14 +34,12 @@ class Outcome:
 
     def l1(self, field: str) -> float:
         scene, time = self.simulation.scene, self.simulation.time
-        found = errors.against_exact(
-            scene.config.problem, scene.eos, time, self.particles, self.pressure
-        )
+        found = errors.against_exact(scene.config, time, self.particles, self.pressure)
         return found["fields"][field]["L1"]
 
     def report(self) -> dict[str, float]:
         scene, time = self.simulation.scene, self.simulation.time
-        return scene.config.problem.report(scene.eos, time, self.particles, self.pressure)
+        return truth.figures(scene.config, time, self.particles, self.pressure)
 
 
 def simulate(config, max_steps: int | None = None) -> Outcome:

@@ -7,6 +7,7 @@ Code units throughout; vectors are (D, N), scalars (N,).
 """
 
 import itertools
+import math
 from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
@@ -194,21 +195,27 @@ class Rates:
     signal_speed_scale: np.ndarray
 
 
-def _axis_images(low, high, boundary):
-    """(sign, offset) of the images along one axis: x' = sign x + offset."""
+def _axis_images(low, high, boundary, reach):
+    """(sign, offset) of the images within reach along one axis: x' = sign x + offset."""
     if boundary == "open":
         return [(1.0, 0.0)]
-    if boundary == "periodic":
-        return [(1.0, 0.0), (1.0, low - high), (1.0, high - low)]
-    if boundary == "mirror":
-        return [(1.0, 0.0), (-1.0, 2 * low), (-1.0, 2 * high)]
-    raise ValueError(f"unknown boundary {boundary!r}")
+    if boundary not in ("periodic", "mirror"):
+        raise ValueError(f"unknown boundary {boundary!r}")
+    found = [(1.0, 0.0)]
+    cells = max(1, math.ceil(reach / (high - low)))
+    for cell in itertools.chain(range(-cells, 0), range(1, cells + 1)):
+        if boundary == "periodic" or cell % 2 == 0:
+            found.append((1.0, cell * (high - low)))
+        else:  # the wall nearest to this copy of the box is at low + (cell + 1)/2 lengths
+            wall = low + (cell + 1) / 2 * (high - low)
+            found.append((-1.0, 2 * wall))
+    return found
 
 
-def _images(scene):
-    """(sign, offset), each (D, 1), of every combination of the axes' images."""
+def _images(scene, reach=0.0):
+    """(sign, offset), each (D, 1), of every combination of the axes' images within reach."""
     axes = [
-        _axis_images(low, high, boundary)
+        _axis_images(low, high, boundary, reach)
         for (low, high), boundary in zip(scene.box, scene.boundaries, strict=True)
     ]
     for combination in itertools.product(*axes):
@@ -221,7 +228,7 @@ def _pairs(scene, position, reach_i, reach_j):
     d, n = position.shape
     rows = max(1, ELEMENTS_PER_BLOCK // n)
     found = []
-    for sign, offset in _images(scene):
+    for sign, offset in _images(scene, max(reach_i.max(), reach_j.max())):
         image = sign * position + offset
         for first in range(0, n, rows):
             block = slice(first, first + rows)
@@ -235,9 +242,6 @@ def _pairs(scene, position, reach_i, reach_j):
 
 def _density(scene, position, mass, support):
     """(rho, Omega, scale of Omega) of eqs 7 and 8 at the given H."""
-    for (low, high), boundary in zip(scene.box, scene.boundaries, strict=True):
-        if boundary != "open" and support.max() > high - low:
-            raise ValueError("H exceeds the box: one image to each side does not suffice")
     n, weight = len(mass), scene.weight(mass)
     pairs = _pairs(scene, position, support, np.zeros(n))
     w, _, by_support = scene.kernel_at(pairs.r, support[pairs.i])

@@ -64,12 +64,43 @@ def test_open_axis_lets_go():
     np.testing.assert_array_equal(position, [[-9.0, 9.0]])
 
 
-def test_support_wider_than_a_closed_box_is_refused_with_the_axis():
-    domain = Domain(BOX, ("periodic", "mirror", "open"))
-    domain.check_reach(0.5, 7)
-    with pytest.raises(NumericalError, match=r"particle 7 .*mirror box along y \(0\.5\)"):
-        domain.check_reach(0.51, 7)
-    Domain(BOX, ("open",) * 3).check_reach(1e9, 7)
+def test_supports_may_take_a_thousand_images_of_the_box():
+    domain = Domain(BOX, ("periodic", "mirror", "open"))  # 2, 0.5 and 3 wide
+    domain.check_reach(14.0, 10, 7)  # 15 x 57 images
+    words = r"particle 7 needs a kernel support of 16, 32 times the shortest side"
+    with pytest.raises(NumericalError, match=words):
+        domain.check_reach(16.0, 10, 7)  # 17 x 65
+    Domain(BOX, ("open",) * 3).check_reach(1e9, 10, 7)
+
+
+def test_supports_wider_than_the_box_may_hold_so_many_neighbours():
+    domain = Domain(BOX[:1], ("periodic",))  # 2 wide
+    domain.check_reach(2.0, 1_000_000, 7)  # no wider: as many as there are
+    domain.check_reach(2.5, 40_000, 7)  # 2.5 copies of the box in reach
+    with pytest.raises(NumericalError, match="or 100000 neighbours in it"):
+        domain.check_reach(2.5, 40_001, 7)
+
+
+@pytest.mark.parametrize("boundary", ["periodic", "mirror"])
+@pytest.mark.parametrize("reach", [0.3, 2.0, 2.1, 5.9, 6.1])
+def test_images_are_all_that_come_within_reach_of_the_box(boundary, reach):
+    """Against copies made one after another, by moving or by reflecting at the next wall."""
+    domain = Domain(BOX[:1], (boundary,))
+    (low, high), x = BOX[0], np.array([-0.9, 0.2, 0.7])
+    sign, offset = domain.images_within(reach)
+    found = {(s, o) for s, o in zip(sign[:, 0], offset[:, 0], strict=True)}
+    assert len(found) == len(sign)
+    expected, right, left = {(1.0, 0.0)}, (1.0, 0.0), (1.0, 0.0)
+    for k in range(max(1, int(np.ceil(reach / (high - low))))):
+        if boundary == "periodic":
+            right, left = (1.0, right[1] + 2.0), (1.0, left[1] - 2.0)
+        else:  # x -> 2 wall - x, after what was done before
+            right = (-right[0], 2.0 * (high + 2.0 * k) - right[1])
+            left = (-left[0], 2.0 * (low - 2.0 * k) - left[1])
+        expected |= {right, left}
+    assert found == expected
+    places = np.sort((sign * x + offset).ravel())
+    assert np.all(np.diff(places) > 0.0)  # no copy twice
 
 
 def test_mirrors_turn_a_fast_particle_as_often_as_it_meets_them():

@@ -33,13 +33,13 @@ class Placed(uniform.Problem):
 
 @pytest.fixture
 def begin(simulate):
-    """begin(positions (D, N), boundary, masses, **physics): a simulation in the unit box."""
+    """begin(positions (D, N), boundary, masses, domain, **physics): a simulation in a box."""
 
-    def start(places, boundary, masses=None, **physics):
+    def start(places, boundary, masses=None, domain=(0.0, 1.0), **physics):
         dimension, n = np.shape(places)
         text = (
             f'[problem]\nname = "uniform"\ndimension = {dimension}\nboundary = "{boundary}"\n'
-            f"domain = [0.0, 1.0]\nvelocity = {[0.0] * dimension}\n[time]\nend = 1e30\n"
+            f"domain = {list(domain)}\nvelocity = {[0.0] * dimension}\n[time]\nend = 1e30\n"
             "[output]\ninterval = 1e30\n"
         )
         config = configuration.from_text(text)
@@ -115,10 +115,41 @@ def test_a_line_of_particles_in_space(begin):
     np.testing.assert_array_equal(simulation.particles.position[1:], 0.5)  # nothing pushes it off
 
 
+@pytest.mark.parametrize("boundary", ["periodic", "mirror"])
+def test_few_particles_in_a_closed_box_have_their_images_for_neighbours(begin, boundary):
+    simulation = begin(np.array([[0.5, 0.6], [0.5, 0.5]]), boundary)
+    assert simulation.particles.support.min() > 1.0  # the box is 1 wide
+    # two particles of one mass, spread over the box: the lattice of their images is a good one
+    mean = simulation.particles.mass.sum()
+    np.testing.assert_allclose(simulation.particles.density, mean, rtol=0.05)
+    advance(simulation)
+
+
 def test_in_a_closed_box_the_particle_is_named(begin):
-    for boundary in ("periodic", "mirror"):
-        with pytest.raises(NumericalError, match=r"particle \d+ needs .* wider than the"):
-            begin(np.array([[0.5, 0.6], [0.5, 0.5]]), boundary)
+    with pytest.raises(NumericalError, match=r"particle \d+ needs .* times the shortest side"):
+        begin(np.array([[0.5, 0.6], [0.5, 0.5]]), "periodic", eta=1e3)
+
+
+def test_a_thin_slab_does_what_a_thick_one_of_its_copies_does(begin):
+    """One layer of gas, several times thinner than a support, and ten of them side by side."""
+    random = np.random.default_rng(4)
+    thin = np.array([(np.arange(40) + random.uniform(0.3, 0.7, 40)) / 40, np.full(40, 0.5)])
+    box = [[0.0, 1.0], [0.49, 0.51]]
+    thick = np.hstack([thin + np.array([[0.0], [0.02 * k]]) for k in range(10)])
+    one = begin(thin, "periodic", domain=box)
+    masses = np.full(400, 1 / 40)
+    ten = begin(thick, "periodic", masses, domain=[[0.0, 1.0], [0.49, 0.69]])
+    assert one.particles.support.max() > 3.0 * 0.02
+    for simulation in (one, ten):
+        for _ in range(5):
+            simulation.advance(1.0)
+    a, b = one.particles.by_id(), ten.particles.by_id()
+    # supports are converged to 1e-10, from different first guesses; five steps add to that
+    assert one.time == pytest.approx(ten.time, rel=1e-9)
+    for name in ("density", "support", "internal_energy", "energy_rate"):
+        copies, expected = getattr(b, name).reshape(10, 40), getattr(a, name)
+        size = np.abs(expected).max()
+        np.testing.assert_allclose(copies, np.tile(expected, (10, 1)), rtol=0, atol=1e-8 * size)
 
 
 def test_too_many_in_one_place_are_named_and_counted(begin):

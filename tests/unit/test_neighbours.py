@@ -66,7 +66,7 @@ def search_over(boundaries, position, support, skin, threads=1):
 def listed(search):
     """(N, images, N) whether block of i lists the image of j; each at most once."""
     count = search.origin.support.size
-    images = len(search.domain.images.sign)
+    images = len(search.images.sign)
     found = np.zeros((count, images * count), dtype=int)
     for block, (start, number) in enumerate(zip(*search.lists[:2], strict=True)):
         packed = search.lists.candidates[start : start + number]
@@ -76,9 +76,9 @@ def listed(search):
     return found.reshape(count, images, count).astype(bool)
 
 
-def distances(domain, position):
+def distances(search, position):
     """(N, images, N) between i and the image of j."""
-    sign, offset = domain.images
+    sign, offset = search.images
     image = sign[:, :, None] * position + offset[:, :, None]  # (images, D, N)
     return np.linalg.norm(position.T[:, None, :, None] - image, axis=2)
 
@@ -86,7 +86,7 @@ def distances(domain, position):
 def missing(search, position, support):
     """Pairs within the larger of their supports that are not in the lists."""
     larger = np.maximum(support[:, None, None], support)
-    return np.count_nonzero((distances(search.domain, position) < larger) & ~listed(search))
+    return np.count_nonzero((distances(search, position) < larger) & ~listed(search))
 
 
 # --- order ---
@@ -172,7 +172,7 @@ def test_lists_do_not_hold_what_is_out_of_reach():
         [np.linalg.norm(np.ptp(x[:, a : a + BLOCK], axis=1)) for a in range(0, 203, BLOCK)], BLOCK
     )[:203]
     reach = 1.1 * np.maximum(largest[:, None, None], support[new]) + diagonal[:, None, None]
-    assert not np.any(listed(search) & (distances(search.domain, x) > reach))
+    assert not np.any(listed(search) & (distances(search, x) > reach))
 
 
 @pytest.mark.parametrize("boundaries", BOUNDARIES, ids=str)
@@ -257,10 +257,20 @@ def test_widening_lists_the_asking_blocks_further_and_the_others_no_less(boundar
     assert not search.stale(x, asked)
 
 
+@pytest.mark.parametrize("skin", [0.01, 1.0])
+@pytest.mark.parametrize("boundary", ["periodic", "mirror"])
+def test_lists_serve_supports_wider_than_the_box(boundary, skin):
+    """However wide their skin is: 0.95 of the box was refused where 0.95 (1 + skin) was more."""
+    position, support = positions("random", 2, 50), np.full(50, 0.95)
+    support[:10] = 3.2
+    search, new = search_over((boundary,) * 2, position, support, skin)
+    assert missing(search, position[:, new], support[new]) == 0
+
+
 def test_supports_and_numbers_that_cannot_be_served_are_refused(monkeypatch):
     position = positions("random", 1, 10)
-    with pytest.raises(NumericalError, match="wider than the periodic box along x"):
-        search_over(("periodic",), position, np.full(10, 0.95), 0.1)
+    with pytest.raises(NumericalError, match="600 times the shortest side of the box"):
+        search_over(("periodic",), position, np.full(10, 600.0), 0.1)
     monkeypatch.setattr(lists, "MAX_PARTICLES", 9)
     search = Search(Domain(np.array([[0.0, 1.0]]), ("open",)), Team(1))
     with pytest.raises(NumericalError, match="10 particles are more than the 9"):

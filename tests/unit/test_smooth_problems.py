@@ -101,7 +101,7 @@ def test_small_wave_is_back_after_a_period_and_a_steep_one_has_broken():
     assert steep.exact(MONATOMIC, 0.999 * breaks, x) is not None
     assert steep.exact(MONATOMIC, 1.001 * breaks, x) is None
     assert (
-        steep.report(MONATOMIC, 2.0, particles_of(steep.initial(MONATOMIC), 1.0, 0.0), None) == {}
+        steep.compare(MONATOMIC, 2.0, particles_of(steep.initial(MONATOMIC), 1.0, 0.0), None) == {}
     )
 
 
@@ -133,7 +133,7 @@ def test_report_tells_floor_damping_and_phase_apart():
         true = problem.exact(MONATOMIC, time, state.position)["density"]
         velocity = problem.exact(MONATOMIC, time - late, state.position)["velocity"]
         particles = particles_of(state, raised * true, damped * velocity)
-        return problem.report(MONATOMIC, time, particles, None)
+        return problem.compare(MONATOMIC, time, particles, None)
 
     # A density high everywhere is no error of the wave. Particles of t = 0 are not quite where the
     # wave of t = 0.5 would have them: second order in the amplitude 1e-6
@@ -147,7 +147,7 @@ def test_report_tells_floor_damping_and_phase_apart():
     assert late["phase_speed_error"] == pytest.approx(-0.02, rel=1e-4)
     assert late["wave_amplitude_error"] == pytest.approx(0.0, abs=4e-6)
     flat = particles_of(state, 1.0 + 0 * state.mass, state.velocity)
-    missing = problem.report(MONATOMIC, 0.0, flat, None)
+    missing = problem.compare(MONATOMIC, 0.0, flat, None)
     assert missing["error_density_relative"] == pytest.approx(2 / np.pi, rel=1e-4)
 
 
@@ -245,13 +245,13 @@ def test_report_of_gresho_finds_no_error_and_sees_one(bulk):
     time = 0.3
     exact = problem.exact(AIR, time, state.position)
     particles = particles_of(state, exact["density"], exact["velocity"])
-    report = problem.report(AIR, time, particles, None)
+    report = problem.compare(AIR, time, particles, None)
     assert report["error_v_phi"] < 1e-14  # round-off of a few operations
     assert report["peak_v_phi"] == pytest.approx(report["peak_v_phi_exact"], rel=1e-13)
     # a ring one spacing wide misses at most its width times the slope 5 of the peak of 1
     assert 1 - 5 / 64 < report["peak_v_phi"] < 1.0
     still = np.repeat(np.array(bulk)[:, None], state.mass.size, axis=1)
-    lost = problem.report(AIR, time, particles_of(state, exact["density"], still), None)
+    lost = problem.compare(AIR, time, particles_of(state, exact["density"], still), None)
     # mean v_phi of the box: 2 pi (5/3 0.2^3 + [r^2 - 5/3 r^3] from 0.2 to 0.4), by hand
     # 0.04 x 2 pi; the lattice samples its kinks to second order
     assert lost["error_v_phi"] == pytest.approx(0.08 * np.pi, rel=1e-3)

@@ -55,6 +55,21 @@ dimension = 1
 n = 100
 domain = [1e9, 1000000001.0]
 """,
+    # a kernel and an eta that a configuration refuses unless it is asked for
+    "paired": """
+[problem]
+name = "uniform"
+n = 400
+noise = 0.2
+[physics]
+kernel = "cubic_spline"
+eta = 2.2
+allow_pairing = true
+[time]
+end = 10.0
+[output]
+interval = 10.0
+""",
     # half of the particles with which the shipped configuration keeps its limits
     "limit": """
 [problem]
@@ -171,8 +186,11 @@ def told(monkeypatch):
     """told(kept, report, ...): the kinds of warning for figures of a summary."""
     monkeypatch.setattr(warnings.resolution, "doubt", lambda _: None)  # there are no particles
 
-    def kinds(kept=(), report=None, **of_problem):
-        summary = {"conservation": KEPT | dict(kept), "errors": None, "report": report or {}}
+    def kinds(kept=(), report=None, median=1.0, **of_problem):
+        summary = {
+            "conservation": KEPT | dict(kept), "errors": None, "report": report or {},
+            "nearest": {"median": median, "smallest": 0.0},
+        }  # fmt: skip
         return [one.kind for one in warnings.of_run(Scene(**of_problem), summary)]
 
     return kinds
@@ -198,6 +216,11 @@ def told(monkeypatch):
 )
 def test_bounds_of_what_is_conserved(told, kept, expected):
     assert told(kept) == expected
+
+
+def test_half_a_spacing_to_the_nearest_neighbour_tells_of_pairs(told):
+    assert told(median=0.49) == ["paired"]
+    assert told(median=0.51) == []  # particles at random places begin with .54
 
 
 def test_a_figure_is_told_once(told):

@@ -5,6 +5,7 @@ from pathlib import Path
 
 from matplotlib.figure import Figure
 
+from sph.analysis import truth
 from sph.analysis.figures import history, maps, profiles, style
 from sph.analysis.figures.sources import Source, State, find_source, labels
 from sph.errors import ConfigError
@@ -60,7 +61,7 @@ def _kind(state: State) -> str:
 
 
 def _shows_profiles(state: State) -> bool:
-    return state.dimension == 1 or (state.has_exact and state.problem.profiled)
+    return state.dimension == 1 or (state.may_have_exact and state.problem.profiled)
 
 
 def _draw_own(source: Source) -> list[Path]:
@@ -87,7 +88,7 @@ def _pictures(source: Source):
     if source.run.history.exists():
         steps = read_history(source.run.history)
         if steps["t"].size:
-            theory = last.problem.theory(last.eos, steps["t"])
+            theory = truth.theory(last.checkpoint.config, steps["t"])
             yield "history", history.figure(steps, last.title, theory)
 
 

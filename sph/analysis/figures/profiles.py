@@ -1,16 +1,19 @@
 """Profiles of density, velocity, pressure and internal energy, along x or against the radius."""
 
+import textwrap
 from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 from matplotlib.figure import Figure
 
+from sph.analysis import truth
 from sph.analysis.errors import FIELDS
 from sph.analysis.figures import style
 from sph.analysis.figures.sources import State
 
 EXACT_POINTS = 2000
+LONGEST_TITLE = 90  # letters in a line
 MOST_BINS = 100
 # A vector file with more dots than this is slow to open, so they become pixels in it.
 MOST_VECTOR_DOTS = 2000
@@ -56,13 +59,28 @@ def profile(state: State) -> Profile:
 
 
 def _exact_along(state: State, at: np.ndarray) -> dict[str, np.ndarray]:
-    """On a line along x through the centre of the box, where `at` is x or the radius."""
-    if not state.has_exact:
+    """On a line along x through the centre of the box, where `at` is x or the radius.
+
+    NaN where waves from the ends of the domain have come, and the solution does not hold.
+    """
+    if state.left_out:
         return {}
     position = np.repeat(state.problem.centre[:, None], at.size, axis=1)
     position[0] = position[0] + at if state.is_radial else at
     exact = state.exact(position)
-    return exact | {"velocity": exact["velocity"][0]}
+    holds = truth.within(state.problem, state.eos, state.time, position)
+    fields = exact | {"velocity": exact["velocity"][0]}
+    return {name: np.where(holds, values, np.nan) for name, values in fields.items()}
+
+
+def _without_exact(states: Sequence[State]) -> str:
+    """Lines for a title that say why an exact solution that the problem has is not drawn."""
+    reasons = {state.left_out for state in states if state.may_have_exact and state.left_out}
+    which = "" if len(states) == 1 else "in part "
+    return "".join(
+        "\n" + textwrap.fill(f"{which}without the exact solution: {reason}", LONGEST_TITLE)
+        for reason in sorted(reasons)[:1]
+    )
 
 
 def single(state: State) -> Figure:
@@ -106,7 +124,7 @@ def _figure(states, labels, colours, title, note_errors: bool) -> Figure:
         _note(panel, name, drawn, errors)
     for panel in list(panels.values())[2:]:
         panel.set_xlabel(f"${profiles[0].symbol}$")
-    figure.suptitle(title)
+    figure.suptitle(title + _without_exact(states))
     entries = [*zip(drawn, labels, strict=True), *((line, "exact") for line in exact[:1])]
     figure.legend(
         *zip(*entries, strict=True), loc="outside lower center", markerscale=2.0,

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from sph.analysis import errors
+from sph.analysis import errors, truth
 from sph.domain import Domain
 from sph.errors import FileError
 from sph.output import checkpoint, same_run
@@ -152,13 +152,19 @@ class State:
         return self.problem.exact(self.eos, self.time, position)
 
     @cached_property
-    def has_exact(self) -> bool:
+    def may_have_exact(self) -> bool:
+        """Whether the problem has an exact solution at this time, though it may not hold here."""
         return self.exact(self.particles.position[:, :1]) is not None
 
+    @cached_property
+    def left_out(self) -> str | None:
+        """Why the exact solution is not to be drawn, None where it is."""
+        return truth.left_out(self.checkpoint.config, self.time, self.particles.position)
+
     def errors(self) -> dict[str, float]:
-        """L1 by field over the problem's region; empty where there is no exact solution."""
+        """L1 by field where the exact solution holds; empty where it does not."""
         found = errors.against_exact(
-            self.problem, self.eos, self.time, self.particles, self.checkpoint.pressure
+            self.checkpoint.config, self.time, self.particles, self.checkpoint.pressure
         )
         return {name: norm["L1"] for name, norm in found["fields"].items()} if found else {}
 

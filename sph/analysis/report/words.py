@@ -77,6 +77,9 @@ def _warnings(report: Report) -> list[str]:
             f"Restarted, so their time includes what their first sessions took to start: "
             f"{', '.join(restarted)}."
         )
+    for row in (*report.rows, *report.without):
+        if changed := row.summary.get("settings_changed"):
+            said.append(f"{row.name} changed its settings on the way: {'; '.join(changed)}.")
     truths = dict.fromkeys(row.truth for row in report.rows)
     if len(truths) > 1 and "." not in report.question.field:
         told = (f"the run {Path(one).name}" if one else "the exact solution" for one in truths)
@@ -106,5 +109,7 @@ def _is_all_front(report: Report, line: Series) -> bool:
 
 def _reason(report: Report, row: Row) -> str:
     if row.status == "done":
-        return f"it has no {report.question.error_name}"
+        left_out = row.summary.get("errors_left_out")
+        why = f": {left_out}" if left_out and "." not in report.question.field else ""
+        return f"it has no {report.question.error_name}{why}"
     return ": ".join(filter(None, [row.status, row.reason.partition("\n")[0]]))

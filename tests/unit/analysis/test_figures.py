@@ -106,7 +106,7 @@ def test_the_run_of_every_problem_draws(tmp_path, problem):
     run = write_run(tmp_path / "run", states)
     drawn = figures.draw([run.path])
     expected = SETS[states[0].dimension] | (
-        {"profiles"} if states[-1].has_exact and states[0].problem.profiled else set()
+        {"profiles"} if states[-1].may_have_exact and states[0].problem.profiled else set()
     )
     assert {path.stem for path in drawn} == expected
     for path in drawn:
@@ -210,7 +210,7 @@ def test_profiles_hold_particles_exact_solution_and_error():
     assert at[0] == state.particles.position[0].min()
     assert at[-1] == state.particles.position[0].max()
     norm = errors.against_exact(
-        state.problem, state.eos, state.time, state.particles, state.checkpoint.pressure
+        state.checkpoint.config, state.time, state.particles, state.checkpoint.pressure
     )["fields"]["density"]["L1"]
     assert norm == pytest.approx(0.05)
     assert "0.05" in picture.axes[0].get_legend().get_texts()[0].get_text()
@@ -233,6 +233,31 @@ def test_profiles_keep_to_the_error_region():
     assert particles.shape[1] == np.sum((x > -0.1) & (x < 0.3))
     assert exact[0].min() > -0.1
     assert exact[0].max() < 0.3
+
+
+def test_no_exact_line_where_it_does_not_hold_and_the_title_says_why():
+    picture = profiles.single(state_of("shock_tube", time=0.6))
+    assert len(lines(picture.axes[0])) == 1
+    said = " ".join(picture.get_suptitle().split())
+    assert "without the exact solution: the exact solution ends at t = 0.2854" in said
+    assert [text.get_text() for text in picture.legends[0].get_texts()] == ["SPH"]
+    in_part = profiles.over_time([state_of("shock_tube", time=t) for t in (0.2, 0.6)])
+    assert "in part without the exact solution" in in_part.get_suptitle()
+    assert len(lines(in_part.axes[0])) == 3
+
+
+def test_the_exact_line_ends_where_waves_from_the_ends_have_come():
+    state = state_of("shock_tube", "problem.boundary=periodic", time=0.1)
+    _, (x, density) = lines(profiles.single(state).axes[0])
+    # heads of the fan and the shock of the second discontinuity, at 1.18322 and 1.75216
+    np.testing.assert_array_equal(np.isfinite(density), (x > -0.381678) & (x < 0.324784))
+
+
+@pytest.mark.parametrize("problem", ["noh", "point_explosion"])
+def test_a_profile_beyond_the_exact_solution_is_drawn_without_it(problem):
+    state = state_of(problem, "problem.dimension=2", time=1.2)
+    picture = figures.main_picture(state)
+    assert "without the exact solution" in picture.get_suptitle()
 
 
 def test_a_blast_is_shown_over_its_radius():

@@ -234,12 +234,17 @@ def test_by_tells_colours_apart_and_lines_stay_apart(tmp_path):
 def test_runs_without_an_error_are_listed(study, tmp_path):
     write_run(study / "failed", None, 1.0, status="failed", reason="u < 0 of particle 3\nTry: …")
     write_run(study / "inexact", None, 1.0)
+    write_run(study / "late", None, 1.0)
+    summary = RunDirectory(study / "late").summary
+    late = json.loads(summary.read_text()) | {"errors_left_out": "the exact solution ends"}
+    summary.write_text(json.dumps(late))
     RunDirectory.create(study / "killed").write_config((study / "failed/config.toml").read_text())
     report = compared(study)
     assert len(report.rows) == 6
     text = said(report)
     assert "Without an error: failed (failed: u < 0 of particle 3)." in text
     assert "Without an error: inexact (it has no L1 of density)." in text
+    assert "Without an error: late (it has no L1 of density: the exact solution ends)." in text
     assert "Without an error: killed (unfinished: it has not ended)." in text
 
 

@@ -67,10 +67,36 @@ def test_a_problem_default_gives_way_to_what_stands_in_its_place(monkeypatch):
     assert found.physics.eos_model().gamma == 2.0
 
 
-def test_a_table_of_the_problem_given_in_part_keeps_the_rest():
-    found = default("problem.left.density=5")
-    assert found.problem.left.density == 5.0
-    assert found.problem.left.pressure == default().problem.left.pressure
+def test_a_member_that_is_set_keeps_the_rest_of_its_table(tmp_path):
+    path = tmp_path / "minimal.toml"
+    path.write_text(MINIMAL)
+    for found in (default("problem.left.density=5"), config.load(path, ["problem.left.density=5"])):
+        assert found.problem.left.density == 5.0
+        assert found.problem.left.pressure == default().problem.left.pressure
+
+
+@pytest.mark.parametrize(
+    "table",
+    [
+        "right = { density = 1.0, velocity = 0.0 }",
+        "right.density = 1.0",
+        "[problem.right]\ndensity = 1.0",
+    ],
+)
+def test_a_table_in_the_file_must_be_complete(tmp_path, table):
+    path = tmp_path / "half.toml"
+    path.write_text(MINIMAL + table + "\n")
+    message = "problem.right.pressure is missing: expected a number greater than 0"
+    with pytest.raises(ConfigError, match=message):
+        config.load(path)
+    with pytest.raises(ConfigError, match=message):  # nor does setting another member fill it
+        config.load(path, ["problem.right.velocity=1"])
+    assert config.load(path, ["problem.right.pressure=0.2"]).problem.right.pressure == 0.2
+
+
+def test_a_table_that_is_set_must_be_complete():
+    with pytest.raises(ConfigError, match=r"problem\.right\.pressure is missing"):
+        default("problem.right={density=1.0}")
 
 
 def test_whole_numbers_become_the_floats_that_are_meant():
@@ -104,6 +130,45 @@ def test_models_of_tables():
     assert physics.kernel_model().flattened is True
     assert physics.eos_model() == (3.0,)
     assert type(physics.eos_model().gamma) is float
+
+
+PAIRS = '[problem]\nname = "uniform"\n[physics]\nkernel = "cubic_spline"\n'
+
+
+@pytest.mark.parametrize(
+    ("kernel", "dimension", "eta", "limit"),
+    [("cubic_spline", 2, 1.41, "1.4"), ("cubic_spline", 3, 1.6, "1.2"),
+     ("quintic_spline", 2, 2.2, "1.8"), ("quintic_spline", 3, 1.7, "1.6")],
+)  # fmt: skip
+def test_a_kernel_is_refused_where_its_particles_pair(tmp_path, kernel, dimension, eta, limit):
+    path = tmp_path / "a.toml"
+    path.write_text(PAIRS)
+    keys = (f"physics.kernel={kernel}", f"problem.dimension={dimension}", f"physics.eta={eta}")
+    with pytest.raises(ConfigError, match=rf"physics\.kernel = .*{dimension}-D .* above {limit}"):
+        config.load(path, keys)
+    assert config.load(path, (*keys, "physics.allow_pairing=true")).physics.eta == eta
+    assert config.load(path, (*keys, f"physics.eta={limit}")).physics.eta == float(limit)
+    assert config.load(path, (*keys, "problem.dimension=1")).physics.eta == eta
+    for other in ("wendland_c2", "{name='cubic_spline', flattened=true}"):
+        assert config.load(path, (*keys, f"physics.kernel={other}")).physics.eta == eta
+
+
+def test_the_error_names_the_line_and_what_to_try(tmp_path):
+    path = tmp_path / "a.toml"
+    path.write_text(PAIRS)
+    with pytest.raises(ConfigError) as error:
+        config.load(path)
+    assert str(error.value).startswith(f"{path}, line 4: physics.kernel = ")
+    assert "physics.allow_pairing = true" in str(error.value)
+    assert "Wendland" in str(error.value)
+
+
+def test_a_run_that_exists_stays_readable_but_not_with_changes():
+    found = config.from_text(PAIRS)
+    assert found.physics.kernel == {"name": "cubic_spline", "flattened": False}
+    with pytest.raises(ConfigError, match="particles pair"):
+        found.override(["time.end=2"])
+    assert found.override(["time.end=2", "physics.allow_pairing=true"]).time.end == 2.0
 
 
 @pytest.mark.parametrize("value", ["1", "7", "converged"])
@@ -332,8 +397,8 @@ WRONG = {
         "line 4: time.zzz is not a key of [time]; there are end",
     ),
     "unknown key, deep": (
-        "left = { densty = 1 }",
-        "line 3: problem.left.densty is not a key of [problem.left]; did you mean density?",
+        "left = { density = 1, pressure = 1, velocty = 1 }",
+        "line 3: problem.left.velocty is not a key of [problem.left]; did you mean velocity?",
     ),
     "key of another table": (
         "alpha = 1",

@@ -50,3 +50,61 @@ def test_problems_solved_for_an_ideal_gas_refuse_another(problem):
     with pytest.raises(ConfigError, match=rf"line 4: physics.eos = .* an ideal gas for {problem}"):
         read(1.0)
     assert read(0.0).physics.eos_model().gamma == 1.4
+
+
+@pytest.mark.parametrize("gas", ["gamma = 7.0", 'eos = { name = "ideal_gas", gamma = 7.5 }'])
+def test_a_blast_that_would_be_hollow_is_refused_before_the_run(gas):
+    """Its solution ends at gamma = 7 in 3-D, and a run would end in that error."""
+
+    def read(dimension, gas):
+        head = f'[problem]\nname = "point_explosion"\ndimension = {dimension}\n[physics]\n'
+        return config.from_text(head + gas, "a").physics
+
+    with pytest.raises(ConfigError, match=r"line 5: physics\..* expected gamma below 7 for point_"):
+        read(3, gas)
+    assert read(2, gas).eos_model().gamma >= 7.0
+    assert read(3, "gamma = 6.9").gamma == 6.9
+
+
+MASS = 'external = { name = "point_mass", mass = 1.0 }'
+
+
+@pytest.mark.parametrize(
+    ("boundary", "is_wrong"),
+    [
+        ('"periodic"', True),
+        ('["mirror", "periodic"]', True),
+        ('["mirror", "open"]', False),
+        ('"mirror"', False),
+        ('"open"', False),
+    ],
+)
+def test_a_point_mass_has_no_place_in_a_periodic_box(boundary, is_wrong):
+    text = f'[problem]\nname = "uniform"\nboundary = {boundary}\n[physics]\n{MASS}\n'
+    if not is_wrong:
+        assert config.from_text(text).physics.external_model().mass == 1.0
+        return
+    with pytest.raises(ConfigError, match=r"line 5: physics.external = .* no periodic images") as e:
+        config.from_text(text, "a")
+    assert "Try: " in str(e.value)
+
+
+@pytest.mark.parametrize(
+    ("conductivity", "is_wrong"),
+    [
+        ('conductivity = "pressure_jump"', True),
+        ('conductivity = { name = "pressure_jump", switched = true }', True),
+        ('conductivity = "approach"', False),
+    ],
+)
+def test_conductivity_that_acts_in_equilibrium_goes_with_no_external_field(conductivity, is_wrong):
+    text = f'[problem]\nname = "uniform"\nboundary = "open"\n[physics]\n{conductivity}\n'
+    assert config.from_text(text).physics.conductivity is not None
+    if not is_wrong:
+        assert config.from_text(text + MASS).physics.external is not None
+        return
+    with pytest.raises(
+        ConfigError, match=r"line 5: physics.conductivity = .*physics.external"
+    ) as e:
+        config.from_text(text + MASS, "a")
+    assert 'Try: "approach"' in str(e.value)

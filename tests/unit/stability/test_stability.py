@@ -14,6 +14,7 @@ from sph.cli import main
 from sph.errors import ConfigError
 from sph.output import checkpoint as checkpoints
 from sph.output.run_directory import RunDirectory
+from sph.problems import base
 from sph.stability import command, table
 from sph.stability.criterion import Criterion, Judge
 from sph.stability.search import Edge
@@ -25,7 +26,7 @@ TUBE = """\
 name = "shock_tube"
 n = 40
 [physics]
-max_energy_drift = 0.002
+max_energy_drift = 0.0002
 [time]
 end = 0.06
 [output]
@@ -68,7 +69,10 @@ def test_a_search_finds_the_largest_stable_courant_number(searched):
     assert f"physics.C: stable up to {end['stable']:g}" in result.output
     steps = next(one["steps"] for one in found["trials"] if one["value"] == end["stable"])
     assert steps < table.FEW_STEPS  # of so short a run
-    assert f"There a run has {steps} steps, too few" in result.output
+    assert f"took {steps} steps, fewer than the 30" in result.output
+    assert "runs to t = 0.06. A run is stable if it ends" in result.output  # the whole of it
+    assert found["whole_end"] == found["end"] == 0.06
+    assert {trial["time"] for trial in found["trials"] if trial["verdict"] != "failed"} == {0.06}
     assert (target / "physics.C.png").stat().st_size > 10_000
     with (target / "physics.C.csv").open() as file:
         lines = list(csv.DictReader(file))
@@ -183,7 +187,10 @@ def test_without_an_exact_solution_runs_are_held_to_the_reference(tmp_path):
     assert 0.0 < trials.done[0.15].error < 1.0
     strict = Judge(reference, Criterion(deviation=1e-12))
     assert strict.trial(0.15, tmp_path / "out" / "default").verdict == "beyond"
-    assert "fields within 5% of the run at C = 0.0375" in trials.judge.in_words()
+    assert (
+        "fields and figures of the report within 5% of the run at C = 0.0375"
+        in trials.judge.in_words()
+    )
 
 
 def test_islands_of_stability_are_told(searched, tube):
@@ -226,6 +233,66 @@ def test_energy_drift_is_held_to_the_problem_or_to_the_reference(searched, tmp_p
     assert judge.trial(0.15, near).verdict == "stable"
     drifts = changed(reference, tmp_path / "reference", drifting(2.0 * allowed))
     assert Judge(drifts, Criterion()).drift == pytest.approx(3.0 * allowed)
+
+
+def test_the_limits_of_the_problem_are_kept_too(searched, tmp_path, monkeypatch):
+    _, target = searched
+    reference, default = target / "physics.C=0.0375", target / "default"
+    bound = {"momentum_change": base.Limit(0.5, "a test"), "no_figure": base.Limit(1.0, "none")}
+    problem = type(Judge(reference, Criterion()).state.config.problem)
+    monkeypatch.setattr(problem, "limits", problem.limits | bound)
+
+    def moving(by):
+        return lambda summary: summary["conservation"].update(momentum_change=by)
+
+    judge = Judge(changed(reference, tmp_path / "reference", moving(0.1)), Criterion())
+    assert judge.figures == {"momentum_change": 0.5}  # the other is no figure of these runs
+    assert "momentum change at most 0.5" in judge.in_words()
+    keeps = judge.trial(0.15, changed(default, tmp_path / "keeps", moving(0.49)))
+    assert keeps.verdict == "stable"
+    for word, by in (("breaks", 0.51), ("none", None)):
+        trial = judge.trial(0.15, changed(default, tmp_path / word, moving(by)))
+        assert trial.verdict == "beyond"
+        assert trial.reason.startswith("momentum change is ")
+        assert trial.reason.endswith(", more than 0.5")
+    breaks = Judge(changed(reference, tmp_path / "too", moving(0.6)), Criterion())
+    assert breaks.figures["momentum_change"] == pytest.approx(0.9)
+
+
+def test_without_an_exact_solution_figures_are_those_of_the_reference(tmp_path):
+    """A mode may be a hundredth of the flow: in the fields its loss would not be seen."""
+    path = tmp_path / "four.toml"
+    path.write_text(
+        '[problem]\nname = "particles"\n[time]\nend = 0.05\n[output]\ninterval = 0.05\n'
+    )
+    reference = Trials(path, "physics.C", (), tmp_path / "out", Criterion(), 1).judge.directory
+
+    def with_mode(name, value):
+        return changed(
+            reference, tmp_path / name, lambda summary: summary["report"].update(mode=value)
+        )
+
+    judge = Judge(with_mode("has", 0.02), Criterion())
+    assert judge.trial(0.15, with_mode("keeps", 0.0191)).verdict == "stable"
+    for name, value in (("loses", 0.0189), ("gains", 0.0211), ("none", "nan")):
+        trial = judge.trial(0.15, with_mode(name, value))
+        assert trial.verdict == "beyond"
+        assert trial.reason == f"mode is {float(value):.3g}, the reference's 0.02"
+    assert Trials(path, "physics.eta", (), tmp_path / "out", Criterion(), 1).judge.report == {}
+
+
+def test_a_shortened_search_says_what_it_did_not_run(tmp_path):
+    path = tmp_path / "four.toml"
+    path.write_text(
+        '[problem]\nname = "particles"\n[time]\nend = 0.05\n[output]\ninterval = 0.05\n'
+    )
+    short = ("time.end=0.02",)
+    found = command.run(path, "physics.C", short, tmp_path / "out", ("resolution=3",), 1)
+    assert (found.end, found.whole_end) == (0.02, 0.05)
+    assert (
+        "runs to t = 0.02 of time.end = 0.05: the search says nothing of later times. "
+        in table.in_words(found)
+    )
 
 
 def test_errors_below_a_part_of_the_field_do_not_count(searched, tmp_path):

@@ -49,8 +49,8 @@ limits = { "history.max_density.max" = { at_most = 0.5, why = "it cannot be kept
 fails = { limit = "history.max_density.max", because = "the density is 1" }
 [settings.refused]
 about = "a support wider than the box allows"
-set = ["problem.boundary=mirror", "physics.eta=30.0"]
-fails = { exit = "wider than the mirror box", because = "it holds fewer particles than asked for" }
+set = ["problem.boundary=mirror", "physics.eta=5e4"]
+fails = { exit = "times the shortest side", because = "it holds fewer particles than asked for" }
 [settings.overflown]
 about = "numbers near the largest there are"
 set = ["problem.noise=0.5", "problem.pressure=1e300"]

@@ -93,6 +93,9 @@ def test_relative_errors_are_of_the_region_alone(tmp_path):
     problem = SimpleNamespace(
         exact=lambda *_: {"density": np.array([1.0, 2.0, 4.0])},
         error_region=lambda *_: (np.array([True, True, False]), "but the last"),
+        departs=lambda _: None,
+        exact_ends=lambda _: (0.5, "it does"),
+        undisturbed=lambda *_: np.array([[-np.inf, np.inf]]),
     )
     physics = SimpleNamespace(eos_model=lambda: None)
     density = np.array([1.5, 2.5, 40.0])
@@ -103,3 +106,5 @@ def test_relative_errors_are_of_the_region_alone(tmp_path):
     )  # fmt: skip
     assert figures.value("relative.density.Linf") == 0.5
     assert figures.value("relative.density.L1") == 0.375  # of volumes that are one
+    figures._last.time = 0.6
+    assert np.isnan(figures.value("relative.density.L1"))

@@ -38,10 +38,10 @@ def test_a_job_that_comes_to_its_limit_goes_on_by_restart(program, tmp_path):
 
 
 def test_a_job_that_fails_is_told(program, tmp_path):
-    result = program.run("--vary", "physics.eta=50.0", "--slurm", "cluster=local", "-o",
+    result = program.run("--vary", "physics.eta=5e4", "--slurm", "cluster=local", "-o",
                          tmp_path / "sweep")  # fmt: skip
     assert result.exit_code == 3, result.output
-    assert "physics.eta=50.0: particle" in result.stderr
+    assert "physics.eta=5e4: particle" in result.stderr
 
 
 def test_options():

@@ -1,0 +1,85 @@
+"""What a restart may change: the class of each key, and words for what was changed.
+
+A key's class stands where the key is declared, `Field(..., json_schema_extra=RECORDED)`, or once
+for all keys of a table, in its class attribute `restart`.
+"""
+
+import re
+from collections.abc import Iterable, Sequence
+from typing import Any, NamedTuple
+
+from sph.config.toml_text import value_text
+from sph.problems.base import Section
+
+CLASSES = {
+    "free": "changes no result, or only how far and how often",
+    "recorded": "changes the equations or their numerical solution; goes into the run's lineage",
+    "same kind": "recorded; a number stays a number, a table a table, and none stays none",
+    "refused": "the checkpoint's gas and the start of its energy budget depend on it",
+}
+FREE, RECORDED, SAME_KIND, REFUSED = ({"restart": name} for name in CLASSES)
+
+_KINDS = {float: "one number", str: "a name", dict: "a table", type(None): "none"}
+_LINEAGE = re.compile(r"restarted at step \d+, t = (\S+) with (.+)")
+
+
+class Change(NamedTuple):
+    """A key as TABLE.KEY, its values (None: not given) and its class."""
+
+    key: str
+    was: Any
+    now: Any
+    rule: str | None
+
+    def __str__(self) -> str:
+        return f"{self.key} = {_text(self.now)} (was {_text(self.was)})"
+
+
+def class_of(section: type[Section], key: str) -> str | None:
+    """The name in CLASSES of a key of that table, None where it is not declared."""
+    return (section.model_fields[key].json_schema_extra or {}).get("restart", section.restart)
+
+
+def changes(before, after) -> list[Change]:
+    """The keys in which the `Config` after differs from that before."""
+    found = []
+    for table, section in vars(after).items():
+        was = getattr(before, table).model_dump(exclude_none=True)
+        now = section.model_dump(exclude_none=True)
+        found += [
+            Change(f"{table}.{key}", was.get(key), now.get(key), class_of(type(section), key))
+            for key in type(section).model_fields
+            if was.get(key) != now.get(key)
+        ]
+    return found
+
+
+def refusals(changed: Iterable[Change]) -> list[str]:
+    """A line for each change that a restart cannot make."""
+    found = []
+    for one in changed:
+        if one.rule == "refused":
+            found.append(
+                f"{one.key} cannot be changed in a restart, which continues the gas of the "
+                "checkpoint and measures energy drift from the start of the run"
+            )
+        elif one.rule == "same kind" and type(one.was) is not type(one.now):
+            kind = _KINDS[type(one.was)]
+            found.append(f"{one.key} = {_text(one.now)}: expected {kind}, as in the checkpoint")
+    return found
+
+
+def lineage(step: int, time: float, changed: Iterable[Change]) -> str:
+    """The line about a restart in the lineage of the checkpoints that it writes."""
+    recorded = ", ".join(str(one) for one in changed if one.rule != "free")
+    return f"restarted at step {step}, t = {time!r}{f' with {recorded}' if recorded else ''}"
+
+
+def settings_changed(lines: Sequence[str]) -> list[str]:
+    """What a lineage says of changed settings: "KEY = VALUE (was VALUE) at t = TIME"."""
+    found = map(_LINEAGE.fullmatch, lines)
+    return [f"{match[2]} at t = {float(match[1]):g}" for match in found if match]
+
+
+def _text(value: Any) -> str:
+    return "not given" if value is None else value_text(value)

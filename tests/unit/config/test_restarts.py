@@ -1,0 +1,104 @@
+"""What a restart may change: every key has a class, and its change is told or refused by it."""
+
+import pytest
+
+from sph import config as configuration
+from sph import registry
+from sph.config import restarts
+from sph.config.sections import SECTIONS
+
+START = """
+[problem]
+name = "uniform"
+dimension = 1
+n = 60
+boundary = "open"
+[physics]
+alpha = 1.0
+[time]
+end = 0.2
+[output]
+interval = 0.05
+"""
+HEATING = 'physics.heating={ name = "relaxation", energy = 1.0, time = 0.1 }'
+RANGE = "physics.alpha={ min = 0.1, max = 2.0 }"
+
+# a changed value of every key beside [problem], by what a restart does with it
+FREE = ["time.end=0.3", "output.interval=0.1", "report.reference=fine", "run.threads=2",
+        "physics.max_energy_drift=0.1"]  # fmt: skip
+RECORDED = ["physics.scheme=variational", "physics.kernel=cubic_spline", "physics.density=number",
+            "physics.alpha=2.0", "physics.conductivity=approach", "physics.eta=1.5",
+            "physics.allow_pairing=true", "physics.max_support=2.0", "physics.C=0.1",
+            "physics.balsara=false",
+            "physics.density_passes=3", "physics.energy_limit=false"]  # fmt: skip
+REFUSED = ["physics.gamma=1.6", 'physics.eos={ name = "ideal_gas", gamma = 1.6 }',
+           'physics.external={ name = "point_mass", mass = 1.0 }', HEATING, RANGE,
+           "problem.n=61", "problem.density=2.0"]  # fmt: skip
+
+
+def changes(overrides, start=()):
+    before = configuration.from_text(START).override(start)
+    return restarts.changes(before, before.override(overrides))
+
+
+@pytest.mark.parametrize("name", [*SECTIONS, *registry.names("sph.problems")])
+def test_every_key_has_a_class(name):
+    section = SECTIONS.get(name) or registry.load("sph.problems", name).Problem
+    for key in section.model_fields:
+        assert restarts.class_of(section, key) in restarts.CLASSES, key
+
+
+def test_every_key_is_tried_below():
+    tried = {override.partition("=")[0] for override in FREE + RECORDED + REFUSED}
+    keys = {f"{name}.{key}" for name, table in SECTIONS.items() for key in table.model_fields}
+    assert keys <= tried
+
+
+@pytest.mark.parametrize("override", FREE)
+def test_what_changes_no_result_is_free(override):
+    changed = changes([override])
+    assert [one.key for one in changed] == [override.partition("=")[0]]
+    assert restarts.refusals(changed) == []
+    assert restarts.lineage(7, 0.1, changed) == "restarted at step 7, t = 0.1"
+
+
+@pytest.mark.parametrize("override", RECORDED)
+def test_what_changes_the_equations_goes_into_the_lineage(override):
+    changed = changes([override])
+    assert restarts.refusals(changed) == []
+    (one,) = changed
+    assert restarts.lineage(7, 0.1, changed) == f"restarted at step 7, t = 0.1 with {one}"
+    assert one.key in str(one)
+    assert "(was " in str(one)
+
+
+@pytest.mark.parametrize("override", REFUSED)
+def test_what_the_checkpoint_depends_on_is_refused(override):
+    assert any(
+        override.partition("=")[0] in line for line in restarts.refusals(changes([override]))
+    )
+
+
+@pytest.mark.parametrize(
+    ("start", "override", "refused"),
+    [
+        ([HEATING], "physics.heating.energy=2.0", False),
+        ([RANGE], "physics.alpha.max=1.0", False),
+        ([RANGE], "physics.alpha=1.0", True),
+    ],
+)
+def test_a_kind_stays_and_its_parameters_may_change(start, override, refused):
+    assert bool(restarts.refusals(changes([override], start))) == refused
+
+
+def test_the_lineage_tells_what_was_changed_and_when():
+    lines = (
+        "restarted at step 3, t = 0.05",
+        restarts.lineage(9, 0.125, changes(["physics.alpha=2.0", "time.end=0.3"])),
+        restarts.lineage(12, 0.15, changes(["physics.conductivity=approach"])),
+    )
+    assert lines[1] == "restarted at step 9, t = 0.125 with physics.alpha = 2.0 (was 1.0)"
+    first, second = restarts.settings_changed(lines)
+    assert first == "physics.alpha = 2.0 (was 1.0) at t = 0.125"
+    assert second.startswith("physics.conductivity = {")
+    assert second.endswith("(was not given) at t = 0.15")

@@ -1,0 +1,196 @@
+"""Restarts that have nothing to do, and what is told of settings changed on the way."""
+
+import hashlib
+import json
+import shutil
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+from sph.cli import main
+from sph.output import checkpoint as checkpoints
+from sph.output.run_directory import RunDirectory
+from sph.simulation import Simulation
+
+TUBE = """\
+[problem]
+name = "shock_tube"
+n = 60
+[time]
+end = 0.02
+[output]
+interval = 0.01
+[run]
+threads = 1
+"""
+END = "is at its end, t = 0.02"
+
+
+def sph_(*arguments):
+    return CliRunner().invoke(main, [str(one) for one in arguments])
+
+
+@pytest.fixture(scope="module")
+def finished(tmp_path_factory):
+    home = tmp_path_factory.mktemp("restarting")
+    (home / "tube.toml").write_text(TUBE)
+    result = sph_("run", home / "tube.toml", "-o", home / "run")
+    assert result.exit_code == 0, result.output
+    return home / "run"
+
+
+@pytest.fixture
+def run(finished, tmp_path):
+    return RunDirectory(shutil.copytree(finished, tmp_path / "run"))
+
+
+def files(directory):
+    """SHA-256 and time of writing of every file below `directory`, by path."""
+    return {
+        path: (hashlib.sha256(path.read_bytes()).hexdigest(), path.stat().st_mtime_ns)
+        for path in directory.rglob("*")
+        if path.is_file()
+    }
+
+
+@pytest.mark.parametrize("which", ["run", "last checkpoint", "lone checkpoint"])
+@pytest.mark.parametrize(
+    ("settings", "code", "words"),
+    [
+        ([], 0, f"{END}: set a later time.end to go on."),
+        (["--threads", "2"], 0, END),
+        (["--set", "time.end=0.02"], 0, END),
+        (
+            ["--set", "physics.kernel=cubic_spline", "--set", "physics.alpha=7"],
+            2,
+            f"{END}: no step would be computed with physics.kernel = ",
+        ),
+        (["--set", "output.interval=0.005"], 2, "output.interval = 0.005 (was 0.01)"),
+    ],
+)
+@pytest.mark.parametrize("elsewhere", [False, True])
+def test_a_restart_without_a_step_to_do_changes_nothing(
+    run, tmp_path, which, settings, code, words, elsewhere
+):
+    source = run.path if which == "run" else run.checkpoint_path(2)
+    if which == "lone checkpoint":
+        source = shutil.copy(source, tmp_path / "lone.h5")
+        elsewhere = True  # else it has nowhere to go
+    before = files(tmp_path)
+    into = ["-o", tmp_path / "new"] if elsewhere else []
+    result = sph_("restart", source, *settings, *into)
+    assert result.exit_code == code, result.output
+    assert words in result.stderr
+    assert str(source) in result.stderr
+    assert files(tmp_path) == before
+    assert not (tmp_path / "new").exists()
+
+
+def test_an_end_that_an_earlier_checkpoint_has_reached_is_no_step_either(run, tmp_path):
+    before = files(run.path)
+    result = sph_("restart", run.checkpoint_path(1), "--set", "time.end=0.01")
+    assert result.exit_code == 2
+    assert "is at its end, t = 0.01" in result.stderr
+    assert files(run.path) == before
+
+
+def test_a_run_killed_before_its_summary_gets_it(run):
+    before = json.loads(run.summary.read_text())
+    kept = files(run.path / "checkpoints")
+    run.summary.unlink()
+    refused = sph_("restart", run.path, "--set", "physics.alpha=7")
+    assert refused.exit_code == 2
+    assert not run.summary.exists()
+    result = sph_("restart", run.path, "--threads", "2")
+    assert result.exit_code == 0, result.output
+    after = json.loads(run.summary.read_text())
+    for key in ("status", "time", "steps", "errors", "conservation", "settings_changed"):
+        assert after[key] == before[key]
+    assert files(run.path / "checkpoints") == kept
+
+
+def test_only_the_last_checkpoint_stands_for_a_missing_summary(run):
+    """Of a run that was taken further, an earlier end is no reason to drop what came later."""
+    ended = run.checkpoint_path(2).read_bytes()
+    assert sph_("restart", run.path, "--set", "time.end=0.03").exit_code == 0
+    run.checkpoint_path(2).write_bytes(ended)
+    run.summary.unlink()
+    before = files(run.path)
+    result = sph_("restart", run.checkpoint_path(2))
+    assert result.exit_code == 0
+    assert END in result.stderr
+    assert files(run.path) == before
+
+
+def test_the_last_checkpoint_of_a_run_that_failed_later_closes_it_again(run):
+    """An attempt to go on has failed: the summary is of that, and not of the last checkpoint."""
+    far = ["--set", "time.end=0.1", "--set", "physics.max_energy_drift=1e-12"]
+    assert sph_("restart", run.path, *far).exit_code == 3
+    assert sph_("restart", run.path).exit_code == 0
+    found = json.loads(run.summary.read_text())
+    assert (found["status"], found["time"]) == ("done", 0.02)
+
+
+def test_settings_changed_on_the_way_are_told(run, tmp_path):
+    first = sph_("restart", run.path, "--set", "time.end=0.03")
+    assert first.exit_code == 0, first.output
+    assert "Settings changed" not in first.stdout
+    found = json.loads(run.summary.read_text())
+    assert found["settings_changed"] == []
+    assert len(found["lineage"]) == 1
+    changes = ["--set", "time.end=0.04", "--set", "physics.alpha=2.0"]
+    second = sph_("restart", run.path, *changes)
+    told = "physics.alpha = 2.0 (was 1.0) at t = 0.03"
+    assert f"Settings changed on the way: {told}." in second.stdout
+    found = json.loads(run.summary.read_text())
+    assert found["settings_changed"] == [told]
+    last = checkpoints.read(run.latest())
+    assert list(last.lineage) == found["lineage"]
+    assert last.lineage[-1].endswith("with physics.alpha = 2.0 (was 1.0)")
+    third = sph_("restart", run.path, "--set", "time.end=0.05")  # it stays told
+    assert told in third.stdout
+    said = sph_("report", run.path, "-o", tmp_path / "report").stdout
+    assert f"changed its settings on the way: {told}." in said
+
+
+def test_a_config_that_is_not_the_checkpoints_is_told(run):
+    """Edited by hand, or left by a restart that was killed before its first checkpoint."""
+    text = run.config.read_text()
+    assert "alpha = 1.0" in text
+    run.config.write_text(text.replace("alpha = 1.0", "alpha = 3.0"))
+    taken = sph_("restart", run.path, "--set", "time.end=0.025", "--set", "physics.alpha=3.0")
+    assert "config.toml has" not in taken.stderr
+    run.config.write_text(text.replace("alpha = 1.0", "alpha = 4.0"))
+    result = sph_("restart", run.path, "--set", "time.end=0.03")
+    assert result.exit_code == 0, result.output
+    assert "config.toml has physics.alpha = 4.0 (the checkpoint: 3.0)" in result.stderr
+    assert checkpoints.read(run.latest()).config.physics.alpha == 3.0
+
+
+SETTINGS = ("--set", "time.end=0.03", "--set", "physics.alpha=2.0", "--set", "physics.C=0.1")
+
+
+@pytest.mark.parametrize("killed_in", ["write_config", "resume", "advance"])
+def test_a_restart_that_is_killed_has_recorded_its_settings(run, tmp_path, monkeypatch, killed_in):
+    """Or none of them: what goes on from there is the whole restart, to the last bit."""
+    whole = RunDirectory(shutil.copytree(run.path, tmp_path / "whole"))
+    assert sph_("restart", whole.path, *SETTINGS).exit_code == 0
+
+    def kill(*_, **__):
+        raise KeyboardInterrupt
+
+    owner = RunDirectory if killed_in == "write_config" else Simulation
+    with monkeypatch.context() as patch:
+        patch.setattr(owner, killed_in, kill)
+        assert sph_("restart", run.path, *SETTINGS).exit_code != 0
+    assert not run.summary.exists()  # which told of the old settings
+    assert sph_("restart", run.path).exit_code == 0
+    one, other = (checkpoints.read(each.latest()) for each in (run, whole))
+    assert one.config == other.config
+    assert one.config.time.end == 0.03
+    assert one.time == 0.03
+    np.testing.assert_array_equal(one.particles.position, other.particles.position)
+    found = json.loads(run.summary.read_text())["settings_changed"]
+    assert found == json.loads(whole.summary.read_text())["settings_changed"]
+    assert "physics.alpha = 2.0 (was 1.0), physics.C = 0.1 (was 0.15) at t = 0.02" in found
