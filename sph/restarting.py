@@ -38,6 +38,8 @@ def restart(
     """
     home, path = find(source)
     checkpoint = checkpoints.read(path)
+    if home is not None:
+        home.check_belongs(path, checkpoint, directory)
     if PART in checkpoint.lineage:
         raise FileError(
             f"{path} holds {PART}: there is no going on from it.\n"

@@ -14,6 +14,8 @@ from sph.problems.base import Section
 
 AtLeastZero = Annotated[float, Field(ge=0)]
 Count = Annotated[int, Field(ge=1)]
+# More passes than this converge no further, and a step would never end.
+Passes = Annotated[int, Field(ge=1, le=100)]
 
 
 class AlphaRange(Section):
@@ -139,7 +141,7 @@ class Physics(Section):
         "rotates, only where |div v| is below 1e-4 c/H",
         json_schema_extra=RECORDED,
     )
-    density_passes: Count | Literal["converged"] = Field(
+    density_passes: Passes | Literal["converged"] = Field(
         2,
         description="passes of the density and smoothing length iteration in a step",
         json_schema_extra=RECORDED,

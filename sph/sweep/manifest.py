@@ -16,7 +16,7 @@ from sph import config as configuration
 from sph.config import Config, reading
 from sph.config.toml_text import key_text, value_text
 from sph.errors import ConfigError, FileError
-from sph.output.files import explained, write_text
+from sph.output.files import explained, is_unfinished, read_text, refuse_link, write_text
 from sph.output.run_directory import RunDirectory
 from sph.sweep.plan import Plan, Point
 from sph.version import __version__
@@ -72,8 +72,9 @@ class SweepDirectory:
             if self.is_one:
                 plan = self._extended(plan, resolved)
             elif self.path.exists():
-                self._refuse_other_things()
+                self._refuse_other_things(reading.read(config))
             self._refuse_other_runs(resolved)
+            refuse_link(self.logs)
             self.logs.mkdir(parents=True, exist_ok=True)
         if not self.is_one:
             write_text(self.base, reading.read(config))
@@ -110,8 +111,16 @@ class SweepDirectory:
                 there = configuration.load(run.config)
                 _refuse_change(f"{run.path} holds a run", there, config)
 
-    def _refuse_other_things(self) -> None:
-        if not self.path.is_dir() or any(self.path.iterdir()):
+    def _refuse_other_things(self, base: str) -> None:
+        """Raise FileError where the directory holds more than what a sweep killed here left."""
+        there = set()
+        if self.path.is_dir():
+            there = {one for one in self.path.iterdir() if not is_unfinished(one.name)}
+        logs = {self.logs} if self.logs.is_dir() and not any(self.logs.iterdir()) else set()
+        ours = (
+            {self.base} if logs and self.base in there and read_text(self.base) == base else set()
+        )
+        if not self.path.is_dir() or there - logs - ours:
             raise FileError(
                 f"{self.path} is there already, and is not the directory of a sweep.\n"
                 f"{OTHER_DIRECTORY}"

@@ -20,7 +20,7 @@ from typing import BinaryIO, NamedTuple
 
 from sph import warnings
 from sph.errors import FileError, NumericalError, SphError, Stopped
-from sph.output.files import explained, write_text
+from sph.output.files import Damaged, explained, open_to_append, write_text
 from sph.output.run_directory import RunDirectory
 from sph.sweep.manifest import SweepDirectory, has_checkpoints, reason_in
 from sph.sweep.plan import Plan, Point
@@ -172,7 +172,7 @@ def _reason(task: Task, code: int, begin: int) -> str:
 @contextmanager
 def _locked(path: Path, stops: Callable[[], int]) -> Iterator[BinaryIO]:
     """`path`, open to append to and locked, as soon as no process holds it. Raises Stopped."""
-    with explained(f"cannot write {path}"), path.open("ab", buffering=0) as file:
+    with open(open_to_append(path), "ab", buffering=0) as file:
         while True:
             with suppress(BlockingIOError):
                 fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
@@ -199,6 +199,6 @@ def _can_go_on(run: RunDirectory) -> bool:
         return False
     try:
         run.latest()
-    except FileError:
+    except Damaged:
         return False
     return True

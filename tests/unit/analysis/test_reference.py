@@ -160,8 +160,8 @@ def test_what_does_not_fit(tubes, tmp_path):
     with pytest.raises(FileError, match="is not a run directory"):
         Reference(tubes)
     (other.path / "checkpoints" / "checkpoint_000000.h5").write_text("damaged")
-    with pytest.raises(FileError, match="is not a checkpoint, or damaged"):
-        Reference(other.path)
+    with pytest.raises(FileError, match="is not an HDF5 file"):
+        Reference(other.path).at(0.0)
 
 
 # --- a reference that the configuration names -------------------------------------------------

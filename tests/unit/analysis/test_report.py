@@ -289,9 +289,23 @@ def test_wrong_questions(study, tmp_path):
     (tmp_path / "empty").mkdir()
     with pytest.raises(FileError, match="holds no runs"):
         compared(tmp_path / "empty")
-    (study / "n=100,alpha=1.0" / "summary.json").write_text("{")
-    with pytest.raises(FileError, match=r"summary\.json cannot be read"):
+    point = study / "n=100,alpha=1.0"
+    for text in ("{", "[]", '{"status": "done"}', '{"status": "done", "reason": "", "cost": 1}'):
+        (point / "summary.json").write_text(text)
+        with pytest.raises(FileError, match=r"summary\.json cannot be read"):
+            compared(study)
+    (point / "config.toml").write_text("problem = 1\n")
+    with pytest.raises(FileError, match=r"config\.toml cannot be read"):
         compared(study)
+
+
+def test_a_report_is_not_written_through_a_link(study, tmp_path):
+    (study / "report").symlink_to(tmp_path)
+    before = sorted(tmp_path.iterdir())
+    result = CliRunner().invoke(main, ["report", str(study)])
+    assert result.exit_code == 4
+    assert "report is a symbolic link" in result.stderr
+    assert sorted(tmp_path.iterdir()) == before
 
 
 # --- what is written --------------------------------------------------------------------------

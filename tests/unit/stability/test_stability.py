@@ -85,7 +85,7 @@ def test_a_run_that_stops_itself_is_a_verdict_with_its_reason(searched):
     failed = [trial for trial in trials if trial["verdict"] == "failed"]
     assert failed, "the drift that is allowed is too large for this test"
     for trial in failed:
-        assert "total energy has changed" in trial["reason"]
+        assert "total energy has drifted" in trial["reason"]
         assert trial["error"] is None
         assert (target / trial["name"] / "offenders.h5").is_file()
 
