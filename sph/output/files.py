@@ -185,6 +185,9 @@ def read_text(path: Path) -> str:
 
 def seal(file: io.FileIO) -> None:
     """Append the SHA-256 of the whole file to it."""
+    with contextlib.suppress(OSError, AttributeError):
+        # on Linux the disk then begins to write, while the digest is computed
+        os.posix_fadvise(file.fileno(), 0, 0, os.POSIX_FADV_DONTNEED)
     digest = _digest(file, os.fstat(file.fileno()).st_size)
     file.write(SEAL + digest.encode() + b"\n")
 

@@ -6,24 +6,25 @@ What compiled code takes on trust is checked here: lengths, order of magnitude, 
 import numpy as np
 
 from sph.neighbours.lists import MAX_PARTICLES
-from sph.scene import Scene
 
 POSITIVE = ("mass", "support", "density", "list_support")
 AT_LEAST_ZERO = ("internal_energy", "alpha")
 # Far above the skin of any run (sph.neighbours.search.best_skin), which is below 1.
 MOST_SKIN = 10.0
+MOST_STEPS = 2**53  # beyond which the history, of float64, cannot count
 
 
 def faults_of_shape(checkpoint) -> list[str]:
     """What is wrong with the shapes and IDs of a checkpoint, in words."""
-    particles, scene = checkpoint.particles, Scene(checkpoint.config)
-    n, D = particles.id.size, scene.dimension
+    particles, config = checkpoint.particles, checkpoint.config
+    n, D = particles.id.size, config.problem.dimension
     if not 1 <= n <= MAX_PARTICLES:
         return [f"it has {n} particles, expected 1 to {MAX_PARTICLES}"]
     found = []
     # alpha_rate and pressure are made where a restart has changed the scene, and left out
-    if scene.evolves_alpha != (particles.alpha is not None):
-        there = "missing" if scene.evolves_alpha else "there"
+    evolves = config.physics.viscosity_model().evolves
+    if evolves != (particles.alpha is not None):
+        there = "missing" if evolves else "there"
         found.append(f"alpha is {there}, which its configuration does not fit")
     for name, array in _arrays(checkpoint).items():
         expected = (n,) if array.ndim == 1 else (D, n)
@@ -52,7 +53,7 @@ def _bad_scalars(checkpoint):
     c = checkpoint
     good = {
         "time": np.isfinite(c.time) and c.time >= 0.0,
-        "step": c.step >= 0,
+        "step": 0 <= c.step <= MOST_STEPS,
         "next_step": np.isfinite(c.next_step) and c.next_step > 0.0,
         "list_skin": 0.0 <= c.list_skin <= MOST_SKIN,
     }

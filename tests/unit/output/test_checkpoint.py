@@ -297,6 +297,7 @@ STRANGE = {
     "null": (replaced("mass", data=h5py.Empty("f8")), "mass has the shape None"),
     "time": (replaced("time", data=np.nan), "time = nan"),
     "step": (replaced("step", data=1e300), "step is of type <f8"),
+    "steps": (replaced("step", data=2**63 - 1), "step = 9223372036854775807"),
     "negative": (replaced("step", data=-1), "step = -1"),
     "no step": (replaced("next_step", data=0.0), "next_step = 0.0"),
     "skin": (replaced("list_skin", data=1e9), "list_skin = 1000000000.0"),
