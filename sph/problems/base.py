@@ -54,6 +54,8 @@ class Problem(Section):
       ideal_gas  whether its solution is that of an ideal gas, so that others are refused
       radial     whether, in 2-D and 3-D, the solution depends on the distance from `centre` alone
       swamped    figures beyond whose bound the problem's small signal is lost in numerical noise
+      truth      what `exact` is, in words and as the label of a line: an exact solution, or a
+                 reference that another method computes
       profiled   whether profiles over x, or that distance, show the solution; maps do else
     """
 
@@ -63,6 +65,7 @@ class Problem(Section):
     ideal_gas: ClassVar[bool] = False
     radial: ClassVar[bool] = False
     swamped: ClassVar[dict[str, Limit]] = {}
+    truth: ClassVar[tuple[str, str]] = ("the exact solution", "exact")
     profiled: ClassVar[bool] = True
 
     name: str = Field(description="which problem: `sph list` names them")

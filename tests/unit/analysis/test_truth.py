@@ -219,3 +219,12 @@ def test_a_wave_of_rounded_digits_is_none():
 def test_a_contact_alone_stays_for_ever(boundary):
     tube = made("shock_tube", "problem.right.pressure=1.0", f"problem.boundary={boundary}")
     assert truth.departure(tube, 1e3) is None
+
+
+@pytest.mark.parametrize("name", ["blast_waves", "shu_osher", "shock_tube"])
+def test_what_another_method_computed_is_not_called_exact(name):
+    made_config = made(name, "problem.n=100")
+    state = at_start(made_config)
+    found = errors.against_exact(made_config, 0.0, state, np.ones(state.mass.size))
+    expected = "the exact solution" if name == "shock_tube" else "a finite-volume solution"
+    assert found["against"] == expected
