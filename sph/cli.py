@@ -1,12 +1,21 @@
 """The command line."""
 
+import signal
 import sys
+
+if __name__ == "__main__":  # python -m sph.cli: as `sph`, before the imports below take time
+    from sph.__main__ import main
+
+    sys.exit(main())
+
 from pathlib import Path
 
 import click
 
-from sph import cli_studies
-from sph.errors import ConfigError, NumericalError, SphError
+from sph import cli_studies, standard_streams
+from sph.docstrings import docstring
+from sph.errors import ConfigError, FileError, NumericalError, SphError
+from sph.shell_words import quoted
 from sph.version import __version__
 
 OVERRIDES = click.option(
@@ -24,15 +33,26 @@ STRICT = click.option(
 class Program(click.Group):
     """Shows the program's own errors as their message and exits with their code."""
 
+    def main(self, *arguments, **settings):
+        standard_streams.secure()
+        return super().main(*arguments, **settings)
+
     def invoke(self, context):
         try:
             return super().invoke(context)
         except SphError as error:
             click.echo(f"sph: {error}", err=True)
             sys.exit(error.exit_code)
+        except OSError as error:  # such as a name that is too long, wherever it was looked at
+            where = "" if error.filename is None else f"{error.filename}: "
+            click.echo(f"sph: {where}{error.strerror or error}.", err=True)
+            sys.exit(FileError.exit_code)
         except MemoryError as error:
             click.echo(f"sph: out of memory: {error}\nTry: a smaller problem.n.", err=True)
             sys.exit(ConfigError.exit_code)
+        except KeyboardInterrupt:  # the second of two, where the first asks for a checkpoint
+            click.echo("sph: ended by Ctrl-C", err=True)
+            sys.exit(128 + signal.SIGINT)
 
 
 @click.group(cls=Program, context_settings={"help_option_names": ["-h", "--help"]})
@@ -62,7 +82,7 @@ def run(config, overrides, directory, threads, dry_run, force, strict):
     if dry_run:
         from sph import preview
 
-        click.echo(preview.describe(resolved))
+        standard_streams.deliver(preview.describe(resolved) + "\n")
         return
     from sph import progress, runner
     from sph.output.run_directory import RunDirectory
@@ -112,7 +132,7 @@ def new(problem, target):
 
     text = configuration.template(problem)
     if target is None:
-        click.echo(text, nl=False)
+        standard_streams.deliver(text)
         return
     from sph.output.files import write_new
 
@@ -133,7 +153,7 @@ def list_choices():
         click.echo(f"{package}:")
         for name in registry.names(f"sph.{package}"):
             module = registry.load(f"sph.{package}", name)
-            click.echo(f"  {name:24s} {module.__doc__.strip().splitlines()[0]}")
+            click.echo(f"  {name:24s} {docstring(module).strip().splitlines()[0]}")
     click.echo("stress cases:")
     for case in stress_cases():
         click.echo(f"  {case.name:24s} {case.title}")
@@ -145,7 +165,7 @@ def _tell(result, target, strict):
     from sph.analysis import summary
 
     click.echo(summary.in_words(result))
-    click.echo(f"Results: {target.path} (`sph plot {target.path}` draws them).")
+    click.echo(f"Results: {target.path} (`sph plot {quoted(target.path)}` draws them).")
     if kinds := warnings.kinds(result):
         said = f"{target.path} ended with warnings: {', '.join(kinds)} (see docs/warnings.md)"
         if strict:
@@ -162,5 +182,5 @@ main.add_command(cli_studies.report)
 main.add_command(cli_studies.stress)
 main.add_command(cli_studies.stability)
 
-if __name__ == "__main__":
-    main()
+for _command in (main, *main.commands.values()):
+    _command.help = docstring(_command.callback)

@@ -5,6 +5,7 @@ from pathlib import Path
 import click
 
 from sph.errors import NumericalError
+from sph.shell_words import quoted
 
 
 @click.command()
@@ -23,7 +24,8 @@ from sph.errors import NumericalError
 @click.option("--slurm", multiple=True, metavar="KEY=VALUE",
               help="Run as Slurm jobs, with this option of submitit, e.g. timeout_min=60 or "
               "partition=short; may be repeated.")  # fmt: skip
-def sweep(config, varies, overrides, directory, jobs, scheduler, slurm):
+@click.option("--yes", "is_sure", is_flag=True, help="Run also more than 1000 points.")
+def sweep(config, varies, overrides, directory, jobs, scheduler, slurm, is_sure):
     """Run CONFIG at every combination of the values, each a run directory in DIR.
 
     Run again, it does only what is missing or failed, and goes on with what was interrupted.
@@ -31,8 +33,8 @@ def sweep(config, varies, overrides, directory, jobs, scheduler, slurm):
     from sph.sweep import command
 
     target = directory or Path("runs") / f"{config.stem}-sweep"
-    click.echo(command.run(config, varies, overrides, target, jobs, scheduler, slurm))
-    click.echo(f"Results: {target} (`sph report {target}` compares them).")
+    click.echo(command.run(config, varies, overrides, target, jobs, scheduler, slurm, is_sure))
+    click.echo(f"Results: {target} (`sph report {quoted(target)}` compares them).")
 
 
 @click.command()

@@ -14,6 +14,7 @@ class Clock(event.Listener):
         self.wall_start = time.perf_counter()
         self.cpu_start = time.process_time()
         self.compiling = 0.0
+        self.on_compilation = None  # called once, when the first function begins to compile
         self._depth = 0
         self._began = 0.0
         event.register("numba:compile", self)
@@ -24,6 +25,9 @@ class Clock(event.Listener):
     def on_start(self, event):
         if self._depth == 0:
             self._began = time.process_time()
+        if told := self.on_compilation:
+            self.on_compilation = None
+            told()
         self._depth += 1
 
     def on_end(self, event):

@@ -7,6 +7,10 @@ from llvmlite import ir
 from numba import types
 from numba.extending import intrinsic, overload
 
+from sph import compile_cache
+
+compile_cache.install()
+
 # Without "nnan" and "ninf": those would let the compiler remove every test for a non-finite number.
 FASTMATH = {"nsz", "arcp", "contract", "afn", "reassoc"}
 

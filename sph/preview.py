@@ -1,55 +1,132 @@
 """What a run would be: the answer of `sph run --dry-run`."""
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
+from sph import standard_streams
 from sph.clock import Clock
 from sph.config import Config
+from sph.errors import ConfigError, NumericalError
+from sph.integrators.step_size import StepLimit
 from sph.neighbours import BALL
 from sph.runner import output_times, threads_of
 from sph.scene import Scene
 from sph.simulation import Simulation
 
+# Of more particles than these, so many are built and their figures scaled: it takes some seconds.
+MOST_BUILT = 20_000
+# The most that are timed: some, so that the lists they share are among their cost.
+TIMED_STEPS, TIMED_SECONDS = 20, 2.0
+
+
+class Sample(NamedTuple):
+    """A few steps of a run, of all its particles or of fewer."""
+
+    parts: tuple[list[str], list[str]]  # compiled in, left out
+    particles: int
+    neighbours: float  # of a particle
+    memory: int  # bytes
+    limit: StepLimit  # of the first step
+    steps: int  # made
+    last_step: float  # of these: a first step may be far from those that follow
+    step_seconds: float  # CPU
+
 
 def describe(config: Config) -> str:
-    """The scene in words: its parts, particles, memory, and steps at the size of the first one.
+    """The scene in words: its parts, particles, memory, and steps at the size of an early one.
 
-    The initial state is built and three steps are made and thrown away: the third is timed, the
-    first of those that finds all its code loaded.
+    Steps are made and thrown away: of this run or, beyond MOST_BUILT particles, of the same one
+    with fewer, from which memory and cost are scaled with N, and the step with N^(-1/D).
+    Raises NumericalError where the run could not begin.
     """
-    clock = Clock()
-    threads = threads_of(config)
-    simulation = Simulation.start(Scene(config), threads, clock)
-    limit = simulation.limit
-    for _ in range(3):
-        before = clock.cpu
-        simulation.advance(math.inf)
-    per_step = clock.cpu - before
-    simulation.close()
-    clock.close()
-    inside, outside = simulation.scene.parts()
-    particles = simulation.particles
-    steps = math.ceil(config.time.end / limit.dt)
+    standard_streams.note("preparing: a scene that is new compiles its code, for up to a minute")
+    sample, is_whole = _sampled(config)
+    particles = sample.particles if is_whole else config.problem.n
+    ratio = particles / sample.particles
+    memory = sample.memory * ratio
+    shorter = ratio ** (-1.0 / config.problem.dimension)
+    first, dt = sample.limit.dt * shorter, sample.last_step * shorter
+    steps, per_step = config.time.end / dt, sample.step_seconds * ratio
     outputs = 1 + sum(1 for _ in output_times(config.time.end, config.output.interval))
-    memory = bytes_held(simulation)
+    inside, outside = sample.parts
+    scaled = [] if is_whole else [f"Figures are scaled from {sample.particles} particles."]
+    whose = f" of particle {sample.limit.particle}" if is_whole else ""
     lines = [
         "The configuration is valid.",
         "Compiled in:",
         *(f"  {part}" for part in inside),
         "Left out:",
         *(f"  {part}" for part in outside),
-        f"Particles: {particles.number}, "
-        f"{neighbours_per_particle(simulation):.0f} neighbours each.",
+        *scaled,
+        f"Particles: {_count(particles, is_whole)}, {sample.neighbours:.0f} neighbours each.",
         f"Memory: {memory / 1e6:.1f} MB for the particles and their lists "
-        f"({memory / particles.number:.0f} bytes each), beside some 250 MB for Python and Numba.",
-        f"First step: {limit.dt:.4g}, set by the {limit.criterion.replace('_', ' ')} of particle "
-        f"{limit.particle}; at that size {steps} steps to t = {config.time.end:g}.",
+        f"({memory / particles:.0f} bytes each), beside some 250 MB for Python and Numba.",
+        f"First step: {first:.4g}, set by the {sample.limit.criterion.replace('_', ' ')}{whose}; "
+        f"step {sample.steps} is {dt:.4g}: at that size {_count(steps, is_whole)} steps to "
+        f"t = {config.time.end:g}.",
         f"Time: a step costs {per_step:.2g} CPU s, so some {per_step * steps:.2g} CPU s in all on "
-        f"{threads} thread(s); steps that grow or shrink change that.",
+        f"{threads_of(config)} thread(s); steps that grow or shrink change that.",
         f"Output: {outputs} checkpoints.",
     ]
     return "\n".join(lines)
+
+
+def _count(number: float, is_exact: bool) -> str:
+    """A count, to three digits where it is an estimate or too long to read."""
+    if not is_exact or not number < 1e12:
+        return f"some {number:.3g}"
+    return str(math.ceil(number))
+
+
+def _sampled(config: Config) -> tuple[Sample, bool]:
+    """A sample and whether it is the run itself, not one with fewer particles.
+
+    Of those the fewest from MOST_BUILT on that the scene bears. Raises NumericalError.
+    """
+    n = MOST_BUILT
+    while n < config.problem.n:
+        standard_streams.note(f"trying {n} of {config.problem.n} particles")
+        try:
+            return _sample(config.override([f"problem.n={n}"])), False
+        except ConfigError:  # too few for this problem, such as for its thinnest layer
+            n *= 4
+        except NumericalError as error:  # too few for its supports, or the run itself fails
+            if n > MOST_BUILT:
+                raise NumericalError(f"with {n} particles: {error}") from error
+            n *= 4
+    return _sample(config), True
+
+
+def _sample(config: Config) -> Sample:
+    clock = Clock()
+    simulation = Simulation.start(Scene(config), threads_of(config), clock)
+    limit = simulation.limit
+    for _ in range(2):  # the first to find their code loaded come after these
+        simulation.advance(math.inf)
+    began, timed = clock.cpu, 0
+    while timed == 0 or (
+        timed < TIMED_STEPS
+        and clock.cpu - began < TIMED_SECONDS
+        and simulation.time < config.time.end
+    ):
+        last_step = simulation.limit.dt
+        simulation.advance(math.inf)
+        timed += 1
+    per_step = (clock.cpu - began) / timed
+    simulation.close()
+    clock.close()
+    return Sample(
+        simulation.scene.parts(),
+        simulation.particles.number,
+        neighbours_per_particle(simulation),
+        bytes_held(simulation),
+        limit,
+        simulation.step,
+        last_step,
+        per_step,
+    )
 
 
 def bytes_held(simulation) -> int:

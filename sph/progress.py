@@ -4,6 +4,8 @@ import os
 import sys
 import time
 
+from sph import standard_streams
+
 # Plain lines come at least this many seconds apart, so that a log stays short.
 LINE_INTERVAL = 10.0
 
@@ -12,7 +14,7 @@ class Lines:
     """A line now and then, for logs."""
 
     def note(self, text):
-        print(text, file=sys.stderr, flush=True)
+        standard_streams.note(text)
 
     def start(self, begin, end):
         self.end = end
@@ -76,7 +78,7 @@ class PointLines:
     """A line for each point of a sweep that has ended."""
 
     def note(self, text):
-        print(text, file=sys.stderr, flush=True)
+        standard_streams.note(text)
 
     def ended(self, count): ...
 
@@ -118,5 +120,5 @@ def _is_watched():
     try:
         # some pseudo-terminals have no width, and no bar would show on them
         return sys.stderr.isatty() and os.get_terminal_size(sys.stderr.fileno()).columns > 0
-    except OSError:
+    except (AttributeError, OSError, ValueError):  # there is no stderr, or it is closed
         return False

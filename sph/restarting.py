@@ -1,5 +1,6 @@
 """Go on from a checkpoint: what may change, where it goes on, and that it does bit for bit."""
 
+import dataclasses
 import json
 from collections.abc import Sequence
 from pathlib import Path
@@ -7,11 +8,13 @@ from pathlib import Path
 import numpy as np
 
 from sph import config as configuration
+from sph import fingerprint
 from sph.analysis import reference
 from sph.clock import Clock
 from sph.config import Config, restarts
 from sph.config.restarts import Change
 from sph.errors import AtEnd, ConfigError, FileError, SphError
+from sph.integrators import step_size
 from sph.neighbours.search import Origin
 from sph.output import checkpoint as checkpoints
 from sph.output.checkpoint import Checkpoint
@@ -35,6 +38,8 @@ def restart(
     """
     home, path = find(source)
     checkpoint = checkpoints.read(path)
+    if home is not None:
+        home.check_belongs(path, checkpoint, directory)
     if PART in checkpoint.lineage:
         raise FileError(
             f"{path} holds {PART}: there is no going on from it.\n"
@@ -53,40 +58,65 @@ def restart(
         _note_damaged(home, path, progress)
         _note_other_settings(home, checkpoint.config, config, progress)
     target, number = _place_to_go_on(home, path, directory)
-    with session(target) as (stopped_by, clock):
-        target.write_config(config.to_toml())
-        simulation = _resumed(config, checkpoint, clock)
-        target.drop_checkpoints_after(number)
-        for old in (target.summary, target.offenders):  # a run that is killed must not keep them
-            old.unlink(missing_ok=True)
+    if reason := fingerprint.differences(checkpoint.computed_by):
+        progress.note(reason)
+    with session(target, config, progress) as (stopped_by, clock):
+        lineage = (
+            *checkpoint.lineage,
+            restarts.lineage(checkpoint.step, checkpoint.time, changed),
+        )
+        next_step = _coming_step(config, checkpoint)
+        begun = dataclasses.replace(checkpoint, config=config, lineage=lineage, next_step=next_step)
+        _begin_anew(target, number, begun, any(not one.key.startswith("run.") for one in changed))
+        simulation = _resumed(begun, clock)
         if target.history.exists():
             history = History.resume(target.history, checkpoint.step)
         else:
             history = new_history(config, simulation, target)
-        lineage = restarts.lineage(checkpoint.step, checkpoint.time, changed)
         runner = Runner(config, target, simulation, history, progress, stopped_by)
         runner.number, runner.saved_step = number + 1, checkpoint.step
-        runner.lineage = (*checkpoint.lineage, lineage)
+        runner.lineage = lineage
         return runner.from_checkpoint(), target
 
 
-def _resumed(config: Config, checkpoint: Checkpoint, clock: Clock) -> Simulation:
+def _begin_anew(target: RunDirectory, number: int, begun: Checkpoint, is_changed: bool) -> None:
+    """Make the directory say what goes on from checkpoint `number`, at every moment one truth.
+
+    What a later state left goes first. Then the settings go into the checkpoint itself, from which
+    every restart takes them: one that is stopped before its first step would lose them else.
+    config.toml, which nobody goes on from, is last.
+    """
+    for old in (target.summary, target.offenders):
+        old.unlink(missing_ok=True)
+    target.drop_checkpoints_after(number)
+    if is_changed:
+        checkpoints.write(target.checkpoint_path(number), begun)
+    target.write_config(begun.config.to_toml())
+
+
+def _resumed(checkpoint: Checkpoint, clock: Clock) -> Simulation:
+    config = checkpoint.config
     origin = Origin(checkpoint.list_position, checkpoint.list_support, checkpoint.list_skin)
     return Simulation.resume(
         Scene(config), checkpoint.particles, checkpoint.time, checkpoint.step,
-        _coming_step(config, checkpoint), origin, threads_of(config), clock,
+        checkpoint.next_step, origin, threads_of(config), clock,
     )  # fmt: skip
 
 
 def _coming_step(config: Config, checkpoint: Checkpoint) -> float:
     """The checkpoint's next step, or what becomes of it under other limits (eq 32)."""
     now, before, p = config.physics, checkpoint.config.physics, checkpoint.particles
-    step = checkpoint.next_step * (now.C / before.C)  # unchanged where C is: bit for bit
+    scene = Scene(config)
+    held, held_before = (s.step_bounds.held[0] for s in (scene, Scene(checkpoint.config)))
+    step = checkpoint.next_step * (held / held_before)  # unchanged where both are: bit for bit
+    if step > checkpoint.next_step:
+        limit = step_size.StepLimit(step, 0, "checkpoint")
+        step = step_size.before_contact(limit, scene.step_bounds, p, scene.domain).dt
     if now.energy_limit and not before.energy_limit:
         warm = p.internal_energy > 0.0  # as for every step: what has no energy sets none
         with np.errstate(divide="ignore"):
             times = p.internal_energy[warm] / np.abs(p.energy_rate[warm])
-        step = min(step, float(now.C * np.min(times, initial=np.inf)))
+        step = min(step, float(held * np.min(times, initial=np.inf)))
     return step
 
 

@@ -2,13 +2,13 @@
 
 import itertools
 import math
-import os
 from collections.abc import Iterator
 from contextlib import closing, contextmanager
 from pathlib import Path
 
 import numpy as np
 
+from sph import faults
 from sph.analysis import reference, summary
 from sph.clock import Clock
 from sph.config import Config
@@ -21,8 +21,10 @@ from sph.output.history import History
 from sph.output.history import read as read_history
 from sph.output.run_directory import RunDirectory
 from sph.scene import Scene
+from sph.shell_words import quoted
 from sph.simulation import Simulation
 from sph.stop_signals import stop_signals
+from sph.threads import available_processors
 
 # A time closer than this to an output, relative to the interval or the end, is that output.
 SAME_TIME = 1e-9
@@ -35,8 +37,8 @@ def run(config: Config, directory: RunDirectory, progress) -> dict:
     close(). Raises NumericalError or Stopped, with what was reached kept in the directory, and
     FileError.
     """
-    with session(directory) as (stopped_by, clock):
-        progress.note("preparing: the first run of a scene compiles its code, for up to a minute")
+    with session(directory, config, progress) as (stopped_by, clock):
+        progress.note("preparing the initial state")
         simulation = Simulation.of_problem(Scene(config), threads_of(config), clock)
         directory.write_config(config.to_toml())
         try:
@@ -54,11 +56,19 @@ def run(config: Config, directory: RunDirectory, progress) -> dict:
 
 
 @contextmanager
-def session(directory: RunDirectory) -> Iterator[tuple[list[str], Clock]]:
+def session(directory: RunDirectory, config: Config, progress) -> Iterator[tuple[list[str], Clock]]:
     """What a run works in: alone in its directory, heeding signals (the list), by a clock."""
+    if (threads := threads_of(config)) > (processors := available_processors()):
+        progress.note(
+            f"run.threads = {threads}, but this process may use {processors} processor(s): more "
+            "threads than processors make a run no faster; its results stay the same"
+        )
     # what is no number the watchdog finds, and names: NumPy's words would come before its own
     quiet = np.errstate(all="ignore")
     with directory.alone(), stop_signals() as stopped_by, closing(Clock()) as clock, quiet:
+        clock.on_compilation = lambda: progress.note(
+            "compiling the code of this scene: up to a minute, in its first run only"
+        )
         yield stopped_by, clock
 
 
@@ -110,7 +120,7 @@ def _of_the_scene(simulation: Simulation) -> dict[str, float]:
 def threads_of(config: Config) -> int:
     """The number of threads a configuration asks for; "all" is every processor we may use."""
     if config.run.threads == "all":
-        return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
+        return available_processors()
     return config.run.threads
 
 
@@ -180,6 +190,8 @@ class Runner:
     def _to_end(self) -> dict:
         simulation, end = self.simulation, self.config.time.end
         times = output_times(end, self.config.output.interval, simulation.time)
+        if held := faults.held_courant(simulation.scene):
+            self.progress.note(held)
         self.progress.start(simulation.time, end)
         try:
             for output in times:
@@ -201,7 +213,7 @@ class Runner:
         words = offenders.leave(self.directory.offenders, self._checkpoint(), error.particle)
         return NumericalError(
             f"{error}\n{words}The last good checkpoint is {last}: "
-            f"`sph restart {last} --set …` goes on from there with other settings.",
+            f"`sph restart {quoted(last)} --set …` goes on from there with other settings.",
             error.particle,
         )
 
@@ -213,7 +225,7 @@ class Runner:
         raise Stopped(
             f"stopped by {name} at t = {simulation.time:.6g}, step {simulation.step}, with "
             f"{self.directory.checkpoint_path(self.number - 1)}.\n"
-            f"`sph restart {self.directory.path}` goes on from there."
+            f"`sph restart {quoted(self.directory.path)}` goes on from there."
         )
 
     def _record(self) -> None:

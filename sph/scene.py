@@ -9,6 +9,7 @@ import numpy as np
 from sph import kernels, schemes
 from sph.config import Config
 from sph.domain import Domain
+from sph.integrators.step_size import Bounds
 from sph.passes import Models
 from sph.passes.smoothing import Converged, FixedPasses
 from sph.passes.weighting import ByMass, ByNumber
@@ -78,10 +79,10 @@ class Scene:
         free = [kind != "mirror" and self.external is None for kind in self.domain.boundaries]
         return np.array(free, dtype=float)
 
-    @property
+    @cached_property
     def is_filled(self) -> bool:
         """Whether gas fills a box without open sides, so that sum m/rho is to be its volume."""
-        return self.config.problem.fills_box and "open" not in self.domain.boundaries
+        return self.config.problem.fills_box(self.eos) and "open" not in self.domain.boundaries
 
     @property
     def max_support(self) -> float:
@@ -94,6 +95,15 @@ class Scene:
     def bounds_acceleration(self) -> bool:
         """Whether |a| bounds the step: a field, or heavy gas beside light, sends no signal."""
         return self.external is not None or self.config.physics.density == "number"
+
+    @cached_property
+    def step_bounds(self) -> Bounds:
+        """What bounds the time step, of what the configuration sets."""
+        physics = self.config.physics
+        return Bounds(
+            physics.C, physics.energy_limit, self.bounds_acceleration, self.config.time.end,
+            self.viscosity.largest(), getattr(self.models.conductivity, "strength", 0.0),
+        )  # fmt: skip
 
     @property
     def needs_curl(self) -> bool:

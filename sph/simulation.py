@@ -57,10 +57,6 @@ class Simulation:
             particles.pressure = None
         elif particles.pressure is None:  # a start, or a restart that has changed the scheme
             particles.pressure = particles.pressure_by(scene.eos)
-        physics = scene.config.physics
-        self._bounds = step_size.Bounds(
-            physics.C, physics.energy_limit, scene.bounds_acceleration, scene.config.time.end
-        )
         if not scene.evolves_alpha or scene.finds_shocks:
             particles.alpha_rate = None
         elif particles.alpha_rate is None:  # a restart that has changed the switch
@@ -325,7 +321,7 @@ class Simulation:
             if self.baseline is None:
                 self.baseline = totals.Baseline.at(self.totals, self.energy_added)
             self.energy_drift = self.baseline.drift(self.totals, self.energy_added)
-            self.limit = step_size.limit(
-                self._bounds, self.particles, self._signal_speed, self._div_v, past
-            )
+            bounds, p = self.scene.step_bounds, self.particles
+            limit = step_size.limit(bounds, p, self._signal_speed, self._div_v, past)
+            self.limit = step_size.before_contact(limit, bounds, p, self.scene.domain)
             self.watchdog.check(self)

@@ -5,11 +5,19 @@ Every particle is written by the one range that holds it, so the split does not 
 """
 
 import itertools
+import os
 from concurrent.futures import ThreadPoolExecutor
 
 # Blocks below which a range is not worth handing to another thread: handing over costs some 50
 # microseconds, and 256 blocks of eight particles are 600 of them in 1-D, 5000 in 3-D.
 SMALLEST_RANGE = 256
+
+
+def available_processors() -> int:
+    """Processors that this process may use."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
 
 
 class Team:

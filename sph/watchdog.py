@@ -6,7 +6,18 @@ and where a sum would not tell: in open domains, and in gas that can be torn apa
 
 import numpy as np
 
-from sph.faults import SMALLER_STEPS, endless_sum, fault, fault_of, what_sets
+from sph.faults import (
+    LARGEST,
+    NEARER_UNITS,
+    drift_remedy,
+    endless_sum,
+    fault,
+    fault_of,
+    longer_steps,
+    of_numbers,
+    smaller_steps,
+    what_sets,
+)  # fmt: skip
 
 # Steps over which the advance of time is compared with that of the run's own past, and by how much
 # it may fall behind: cold gas meeting a shock may take some hundred steps of next to no length.
@@ -24,13 +35,6 @@ SETTLING = 100
 
 # Windows to go beyond which a run is not going anywhere: more steps than a machine lasts for.
 MOST_WINDOWS = 1e12
-
-# Squares and cubes of what a run begins with, their sums and inverses have to be numbers too.
-LARGEST = 1e100
-NEARER_UNITS = (
-    f"code units in which it is nearer to 1: outside {1.0 / LARGEST:g} to {LARGEST:g} its square "
-    "and cube are no numbers any more"
-)
 
 
 class Watchdog:
@@ -94,15 +98,14 @@ class Watchdog:
         )
         for name, values, bad in tests:
             if bad.any():
-                remedy = SMALLER_STEPS if simulation.step else NEARER_UNITS
-                raise fault_of(simulation, name, values, bad, remedy)
+                raise fault_of(simulation, name, values, bad, of_numbers(simulation))
         if not np.isfinite(sums).all():
             raise endless_sum(simulation)
         raise fault(
             simulation,
-            f"the time step has shrunk to {dt:.3g}, which moves time on no more: "
+            f"the time step fell to {dt:.3g}, too small to advance time: "
             f"{what_sets(simulation.limit)}",
-            SMALLER_STEPS,
+            longer_steps(simulation),
             simulation.limit.particle,
         )
 
@@ -129,13 +132,11 @@ class Watchdog:
             return
         p = simulation.particles
         i = int(np.argmax(p.mass * (0.5 * (p.velocity**2).sum(axis=0) + p.internal_energy)))
-        pulled = simulation.scene.external is not None
         raise fault(
             simulation,
             f"total energy has drifted by {100 * simulation.energy_drift:.3g} %, more than "
             f"physics.max_energy_drift = {self.max_drift:g}; particle {p.id[i]} holds the most",
-            f"{SMALLER_STEPS}{', a softening of physics.external' * pulled}, or a larger "
-            "physics.max_energy_drift if that is good enough",
+            drift_remedy(simulation),
             int(p.id[i]),
         )
 
@@ -160,7 +161,7 @@ class Watchdog:
                     simulation,
                     f"particle {p.id[i]} is lost: its {'xyz'[axis]} = {x[i]:.6g} is more than "
                     f"{FAR:g} lengths of the open domain outside it",
-                    f"a wider problem.domain if it belongs there, {SMALLER_STEPS} if not",
+                    f"a wider problem.domain if it belongs there, else {smaller_steps(simulation)}",
                     int(p.id[i]),
                 )
 
@@ -177,8 +178,7 @@ class Watchdog:
                 f"the time step has collapsed to {simulation.limit.dt:.3g}: "
                 f"{what_sets(simulation.limit)}. The last {WINDOW} steps covered {covered:.3g} of "
                 f"time, where {WINDOW} steps of this run have covered {self._longest:.3g}",
-                "physics.energy_limit = false where cold gas sets the step, else a larger "
-                "physics.alpha or more particles",
+                longer_steps(simulation),
                 simulation.limit.particle,
             )
         left = self._end - simulation.time

@@ -41,7 +41,8 @@ def by_field(state: dict, exact: dict, volume, inside) -> dict[str, dict[str, fl
 def against_exact(config: Config, time: float, particles, pressure) -> dict | None:
     """Norms by field where the exact solution holds, or None: `truth.left_out` says why.
 
-    {"region": words, "particles": how many, "fields": {field: {"L1": …, …}}}, see `by_field`
+    {"against": words, "region": words, "particles": how many, "fields": {field: {"L1": …, …}}},
+    see `by_field`
     """
     if truth.left_out(config, time, particles.position):
         return None
@@ -55,4 +56,9 @@ def against_exact(config: Config, time: float, particles, pressure) -> dict | No
         "internal_energy": particles.internal_energy,
     }
     fields = by_field(state, exact, particles.mass / particles.density, inside)
-    return {"region": words, "particles": int(inside.sum()), "fields": fields}
+    return {
+        "against": problem.truth[0],
+        "region": words,
+        "particles": int(inside.sum()),
+        "fields": fields,
+    }

@@ -1,16 +1,16 @@
 """Errors against a finer run of the same problem, for want of an exact solution."""
 
 import os
+from bisect import bisect_left
 from pathlib import Path
 
-import h5py
 import numpy as np
 from scipy.spatial import cKDTree
 
 from sph.analysis.errors import FIELDS, by_field
 from sph.config import Config
 from sph.domain import Domain
-from sph.errors import ConfigError, FileError
+from sph.errors import ConfigError
 from sph.output import checkpoint
 from sph.output.checkpoint import Checkpoint
 from sph.output.run_directory import RunDirectory
@@ -26,19 +26,28 @@ class Reference:
 
     def __init__(self, path: Path):
         self.run = RunDirectory.open(path)
-        self._times = {_time(one): one for one in self.run.checkpoints()}
-        self._read: tuple[float, Checkpoint] | None = None
+        self._times: dict[Path, float] = {}
+        self._read: tuple[Path, Checkpoint] | None = None
 
     def at(self, time: float) -> Checkpoint:
-        """The checkpoint at that time. Raises ConfigError where there is none."""
-        nearest = min(self._times, key=lambda other: abs(other - time), default=np.inf)
-        if not abs(nearest - time) <= SAME_TIME * max(abs(nearest), abs(time)):
+        """The checkpoint at that time. Raises ConfigError where there is none, FileError."""
+        paths = self.run.checkpoints()  # their times rise
+        i = bisect_left(paths, time - SAME_TIME * abs(time), key=self._time)
+        if i == len(paths) or not self._time(paths[i]) <= time + SAME_TIME * abs(time):
             raise ConfigError(
                 f"the reference {self.run.path} has no checkpoint at t = {time:.6g}.\n"
                 "Try: a reference with the same time.end, or an output.interval that meets it."
             )
-        if self._read is None or self._read[0] != nearest:  # one at a time: they may be large
-            self._read = nearest, checkpoint.read(self._times[nearest])
+        return self._state(paths[i])
+
+    def _time(self, path: Path) -> float:
+        if path not in self._times:
+            self._times[path] = self._state(path).time
+        return self._times[path]
+
+    def _state(self, path: Path) -> Checkpoint:
+        if self._read is None or self._read[0] != path:  # one at a time: they may be large
+            self._read = path, checkpoint.read(path)
         return self._read[1]
 
 
@@ -144,11 +153,3 @@ def _check(coarse: Config, fine: Config, reference: Path, name: str) -> None:
                 f"the reference {reference} has problem.{key} = {getattr(theirs, key)}, but "
                 f"{name} has {getattr(ours, key)}.\nTry: a reference of the same problem."
             )
-
-
-def _time(path: Path) -> float:
-    try:
-        with h5py.File(path, "r") as file:
-            return float(file[checkpoint.GROUP]["time"][()])
-    except (OSError, KeyError):
-        raise FileError(f"{path} is not a checkpoint, or damaged.") from None

@@ -156,7 +156,9 @@ def peak_memory() -> int:
 
 def _percent(relative: float | None) -> str:
     """An error relative to the exact field, in brackets; nothing where that is zero."""
-    return "" if relative is None else f" ({100.0 * relative:.2g} %)"
+    if relative is None:
+        return ""
+    return f" ({100.0 * relative:.2g} %)" if relative < 1.0 else f" ({relative:.2g} times its size)"
 
 
 def in_words(summary: dict) -> str:
@@ -197,7 +199,7 @@ def _errors_in_words(summary: dict) -> str:
         for name, norm in errors["fields"].items()
     )
     named = errors.get("reference")
-    truth = "the exact solution" if named is None else f"the run {named}"
+    truth = errors["against"] if named is None else f"the run {named}"
     return f"Error (L1 against {truth}, {errors['region']}): {fields}."
 
 

@@ -85,7 +85,7 @@ def output_issues(found: dict[str, Section]) -> list[Issue]:
 def shape_issues(raw: dict[str, Any], problem: type[Problem]) -> list[Issue]:
     """The domain and the boundaries against the number of dimensions; types are checked later."""
     known = {name: field.get_default() for name, field in problem.model_fields.items()} | raw
-    if known["dimension"] not in (1, 2, 3):
+    if type(known["dimension"]) is not int or known["dimension"] not in (1, 2, 3):
         return []
     found = []
     if isinstance(known["domain"], list):

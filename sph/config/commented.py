@@ -9,6 +9,7 @@ from pydantic.fields import FieldInfo
 from sph.config import restarts
 from sph.config.errors import branches, describe, field_annotation
 from sph.config.toml_text import value_text
+from sph.docstrings import docstring
 
 
 def text(sections: dict[str, BaseModel]) -> str:
@@ -22,7 +23,7 @@ def _table(name: str, section: BaseModel) -> str:
         _key(key, field, _help(model, key), getattr(section, key), _restart(model, key))
         for key, field in model.model_fields.items()
     )
-    summary = _comment((model.__doc__ or "").partition("\n\n")[0])
+    summary = _comment(docstring(model).partition("\n\n")[0])
     return f"{summary}[{name}]\n\n" + "\n".join(keys)
 
 

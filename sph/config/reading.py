@@ -104,6 +104,10 @@ def _set(source: Source, override: str) -> None:
     path = tuple(step.strip() for step in name.split("."))
     if not equals or not all(path):
         raise ConfigError(f"--set {override}: expected TABLE.KEY=VALUE")
+    try:
+        override.encode()
+    except UnicodeEncodeError:
+        raise ConfigError(f"--set {override}: expected UTF-8 text, as in a file") from None
     table = source.tables
     for step in path[:-1]:
         if not isinstance(table.get(step), dict):

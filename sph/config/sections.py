@@ -14,6 +14,8 @@ from sph.problems.base import Section
 
 AtLeastZero = Annotated[float, Field(ge=0)]
 Count = Annotated[int, Field(ge=1)]
+# More passes than this converge no further, and a step would never end.
+Passes = Annotated[int, Field(ge=1, le=100)]
 
 
 class AlphaRange(Section):
@@ -129,7 +131,8 @@ class Physics(Section):
     C: float = Field(
         0.15,
         gt=0,
-        description="Courant number: the time step in units of the stable one",
+        description="Courant number: the time step in units of support over signal speed; held "
+        "where the leapfrog is stable with physics.alpha and physics.conductivity",
         json_schema_extra=RECORDED,
     )
     balsara: bool = Field(
@@ -138,7 +141,7 @@ class Physics(Section):
         "rotates, only where |div v| is below 1e-4 c/H",
         json_schema_extra=RECORDED,
     )
-    density_passes: Count | Literal["converged"] = Field(
+    density_passes: Passes | Literal["converged"] = Field(
         2,
         description="passes of the density and smoothing length iteration in a step",
         json_schema_extra=RECORDED,
@@ -226,7 +229,14 @@ class Output(Section):
 
 
 def _absolute(path: str) -> str:
-    return path and os.path.abspath(path)
+    found = path and os.path.abspath(path)
+    try:
+        found.encode()  # else a configuration, which is UTF-8, could not hold it
+    except UnicodeEncodeError:
+        raise ValueError(f"{found!a}: expected a path that is UTF-8 text") from None
+    if "\0" in found:
+        raise ValueError(f"{found!r}: expected a path, which holds no NUL")
+    return found
 
 
 class Report(Section):

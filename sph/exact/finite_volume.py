@@ -14,6 +14,9 @@ from numba import njit
 
 from sph.compiled import COMPILED
 
+# What a problem calls its `exact` where that is made here.
+TRUTH = ("a finite-volume solution", "finite volumes")
+
 # Share of the time in which sound crosses a cell; faces move less than that
 COURANT = 0.5
 

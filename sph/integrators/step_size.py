@@ -1,24 +1,48 @@
 """The global time step (seed eq 32), what else bounds it, and the particle that sets it.
 
-Eq 32 knows of no gas that parts: v_sig counts approach alone, and in a fast expansion it would let
-particles leave each other in one step. So a support may change by SUPPORT_CHANGE of itself: by
-dH/dt = H div v/D where the scene has the divergence, else as far as it changed in the last step. A
-step may be GROWTH times as long as the one before, so that a flow that has just been stiff is not
-left in one leap. A field from outside, where there is one, bounds it by C (H/|a|)^(1/2). No step is
-longer than the run.
+Each bound that eq 32 lacks, and why:
+
+- "support", "growth". v_sig counts approach alone; gas that parts fast could lose its neighbours in
+  one step. A support may change by SUPPORT_CHANGE of itself: by dH/dt = H div v/D where the scene
+  has the divergence, else as far as it changed in the last step. A step may be GROWTH times as long
+  as the one before, so that a flow that has just been stiff is not left in one leap.
+- "acceleration". An external field bounds the step by C (H/|a|)^(1/2).
+- "approach". v_sig counts neighbours alone; gas that is still apart may overlap in one step. Such a
+  pair may come 2C/3 of H deep, as far as eq 32 lets neighbours approach (neighbours/approach.py).
+- "viscosity", "conductivity". Both damp differences between neighbours, at a rate lambda. With
+  a = -w^2 x - lambda v, where a takes the predicted v of eq 4, one step maps
+  (x, v dt, a dt^2) -> x' = x + v dt + a dt^2/2, a' dt^2 = -(w dt)^2 x' - lambda dt (v dt + a dt^2),
+  v' = v + (a + a') dt/2. At the limit of stability the map has the eigenvalue -1, which makes v = 0
+  and a dt^2 = -4x, so the leapfrog is stable where
+
+      lambda dt + (w dt)^2 / 4 < 1.
+
+  With lambda = alpha v_sig/H and w = 2 v_sig/H a step of C 2H/v_sig is stable while
+  2 alpha C + 4 C^2 < 1, and C is held there. (Eq 24 damps velocities that alternate along a line of
+  particles H/2.6 apart by 0.84 alpha v_sig/H; what is left is for other kernels and for approach,
+  which doubles lambda where v_sig is mostly w_ij.) alpha is the largest that the switch allows: it
+  may rise to that within a step. The conductivity's strength times C is held to CONDUCTIVITY. What
+  was measured is in docs/measurements.md, "Time step and viscosity".
+- "end". No step is longer than the run.
 """
 
+import math
 from typing import NamedTuple
 
 import numpy as np
 from numba import njit
 
 from sph.compiled import COMPILED
+from sph.neighbours.approach import first_contact
 
-CRITERIA = ("signal_speed", "energy", "acceleration", "support", "growth", "end")
+CRITERIA = (
+    "signal_speed", "energy", "acceleration", "support", "growth", "end", "viscosity",
+    "conductivity", "approach",
+)  # fmt: skip
 
 SUPPORT_CHANGE = 0.2
 GROWTH = 1.5
+CONDUCTIVITY = 1.5
 
 
 class StepLimit(NamedTuple):
@@ -33,12 +57,28 @@ class StepLimit(NamedTuple):
 
 
 class Bounds(NamedTuple):
-    """Of a run: the Courant number C, whether u/|du/dt| and |a| bound the step, and its end."""
+    """Of a run: the Courant number C, whether u/|du/dt| and |a| bound the step, and its end.
+
+    Beside them the largest alpha of the viscosity and the strength of the conductivity.
+    """
 
     courant: float
     energy: bool
     acceleration: bool
     end: float
+    alpha: float = 0.0
+    conductivity: float = 0.0
+
+    @property
+    def held(self) -> tuple[float, str]:
+        """The Courant number that the run takes, C or less, and the criterion of its signals."""
+        held, criterion = self.courant, "signal_speed"
+        stable = 1.0 / (self.alpha + math.sqrt(4.0 + self.alpha**2))  # 2 alpha C + 4 C^2 = 1
+        if stable < held:
+            held, criterion = stable, "viscosity" if self.alpha > 2.0 * stable else criterion
+        if self.conductivity * held > CONDUCTIVITY:
+            held, criterion = CONDUCTIVITY / self.conductivity, "conductivity"
+        return held, criterion
 
 
 class Past(NamedTuple):
@@ -103,11 +143,12 @@ def limit(bounds: Bounds, particles, signal_speed, divergence, past: Past | None
     divergence (N,) of velocity, None in scenes without; no past at the start.
     """
     p = particles
+    courant, by_signals = bounds.held
     dt, particle, criterion = _smallest(
         p.support, signal_speed, p.internal_energy, p.energy_rate,
         p.acceleration if bounds.acceleration else None, p.id, bounds.energy,
     )  # fmt: skip
-    dt, criterion = bounds.courant * dt, CRITERIA[criterion]
+    dt, criterion = courant * dt, CRITERIA[criterion] if criterion else by_signals
     rate, changed = _rate_of_supports(p, divergence, past)
     if rate * dt > SUPPORT_CHANGE:
         dt, particle, criterion = SUPPORT_CHANGE / rate, changed, "support"
@@ -116,6 +157,16 @@ def limit(bounds: Bounds, particles, signal_speed, divergence, past: Past | None
     if dt > bounds.end:
         dt, particle, criterion = bounds.end, 0, "end"
     return StepLimit(dt, int(particle), criterion)
+
+
+def before_contact(limit: StepLimit, bounds: Bounds, particles, domain) -> StepLimit:
+    """`limit`, cut where particles that are no neighbours yet would meet too deep in that step."""
+    p = particles
+    part, particle = first_contact(
+        p.position, p.velocity, p.acceleration, p.support, p.id, domain.images,
+        domain.longest_reach, limit.dt, 2.0 / 3.0 * bounds.held[0],
+    )  # fmt: skip
+    return StepLimit(part * limit.dt, int(particle), "approach") if part < 1.0 else limit
 
 
 def _rate_of_supports(particles, divergence, past: Past | None) -> tuple[float, int]:

@@ -6,11 +6,14 @@ what is text (configuration, versions, lineage, hashes) is attributes. Nothing t
 to run is written: equal checkpoints are equal files, byte by byte.
 """
 
+import functools
 import hashlib
 import importlib.metadata
+import io
 import json
 import platform
 import sys
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -18,21 +21,21 @@ import h5py
 import numpy as np
 
 from sph import config as configuration
+from sph import fingerprint
 from sph.errors import ConfigError, FileError
-from sph.output import layout
-from sph.output.files import PatientFile, replacing
+from sph.output import layout, stored, validity
+from sph.output.files import Damaged, PatientFile, is_sealed, opened, replacing, seal
+from sph.output.stored import GROUP, Refused
 from sph.particles import Particles
 from sph.version import __version__
 
 # To be raised with every change of what the datasets of /Checkpoint mean.
 FORMAT_VERSION = 1
 
-GROUP = "Checkpoint"
-HDF5_SIGNATURE = b"\x89HDF\r\n\x1a\n"
 NOT_PARTICLES = ("time", "step", "next_step", "list_position", "list_support", "list_skin")
 
-# What h5py raises on a damaged file, by where in it the damage is.
-DAMAGE = (OSError, RuntimeError, KeyError, ValueError, TypeError, AttributeError)
+# Last in the lineage of a file that holds some particles alone, which no run goes on from.
+PART = "a particle that failed and its neighbours, alone"
 
 START_ELSEWHERE = "Try: an earlier checkpoint of the run, or start the run anew."
 
@@ -50,6 +53,7 @@ class Checkpoint:
     list_skin: float  # their skin, as a fraction of H
     config: configuration.Config
     lineage: tuple[str, ...]  # the runs it came from, oldest first
+    computed_by: str | None = None  # of one that was read: `fingerprint.as_json` of its writer
 
     @property
     def pressure(self) -> np.ndarray:
@@ -70,34 +74,40 @@ def write(path: Path, checkpoint: Checkpoint) -> None:
 
     Raises FileError where the file system refuses.
     """
-    with replacing(Path(path)) as unfinished, PatientFile(unfinished) as disk:
+    state = _state(checkpoint)
+    with (
+        ThreadPoolExecutor(1) as beside,
+        replacing(path) as unfinished,
+        PatientFile(unfinished) as disk,
+    ):
+        digest = beside.submit(state_hash, state)  # while HDF5 waits for the disk
         with h5py.File(disk, "w") as file:
             layout.write_public(file, checkpoint)
-            _write_private(file.create_group(GROUP), checkpoint)
+            _write_private(file.create_group(GROUP), checkpoint, state, digest)
+        seal(disk)
         disk.raise_failure()
 
 
 def read(path: Path) -> Checkpoint:
     """The checkpoint in `path`, bit for bit as it was written.
 
-    Raises FileError where it is missing, not a checkpoint, truncated, damaged or of another format.
+    Raises Damaged where its content is not what was written; FileError where it is missing, cannot
+    be read, is not a checkpoint, of another format, or holds what no run writes.
     """
     path = Path(path)
-    _refuse_what_is_not_hdf5(path)
     try:
-        file = h5py.File(path, "r")
-    except DAMAGE as error:
-        raise FileError(f"{path} is truncated or damaged.\n{START_ELSEWHERE}") from error
-    with file:
-        try:
-            group = _private_group(path, file)
-            state = {name: dataset[()] for name, dataset in group.items()}
-            attributes = dict(group.attrs)
-            _check_hashes(state, attributes)
-            config = _config(path, attributes["configuration"])
-            return _checkpoint(state, config, tuple(json.loads(attributes["lineage"])))
-        except DAMAGE as error:
-            raise FileError(f"{path} is damaged ({error}).\n{START_ELSEWHERE}") from error
+        with opened(path) as file:
+            state, texts = _stored(path, file)
+    except FileNotFoundError:
+        raise FileError(
+            f"there is no checkpoint {path}.\nTry: `ls {path.parent}` for those there are."
+        ) from None
+    _check_hashes(path, state, texts)
+    config = _config(path, texts["configuration"])
+    checkpoint = _checkpoint(state, config, _lineage(path, texts["lineage"]))
+    checkpoint.computed_by = texts.get("computed_by")
+    _check_state(path, checkpoint)
+    return checkpoint
 
 
 def state_hash(state: dict[str, np.ndarray]) -> str:
@@ -110,28 +120,31 @@ def state_hash(state: dict[str, np.ndarray]) -> str:
     return digest.hexdigest()
 
 
-def _write_private(group: h5py.Group, checkpoint: Checkpoint) -> None:
+def _state(checkpoint: Checkpoint) -> dict[str, np.ndarray]:
     state = {name: np.asarray(getattr(checkpoint, name)) for name in NOT_PARTICLES}
-    state |= checkpoint.particles.arrays()
+    return state | checkpoint.particles.arrays()
+
+
+def _write_private(group: h5py.Group, checkpoint: Checkpoint, state, digest) -> None:
+    """Write the state; digest: the future of its SHA-256."""
     for name, array in state.items():
-        if array.ndim:
-            layout.write_array(group, name, array)
-        else:
-            group.create_dataset(name, data=array)
+        group.create_dataset(name, data=array)  # no checksum of HDF5's: two digests are enough
     text = checkpoint.config.to_toml(include_run=False)
     group.attrs.update(
         {
             "format_version": FORMAT_VERSION,
             "configuration": text,
             "lineage": json.dumps(checkpoint.lineage),
-            "sha256": state_hash(state),
+            "sha256": digest.result(),
             "configuration_sha256": _text_hash(text),
             "machine": f"{platform.machine()} {sys.byteorder}-endian",
             "versions": _versions(),
+            "computed_by": fingerprint.as_json(),
         }
     )
 
 
+@functools.cache
 def _versions() -> str:
     """The program and what it computes with, as JSON."""
     packages = {name: importlib.metadata.version(name) for name in ("numpy", "numba", "h5py")}
@@ -142,56 +155,82 @@ def _text_hash(text: str) -> str:
     return hashlib.sha256(text.encode()).hexdigest()
 
 
-def _refuse_what_is_not_hdf5(path: Path) -> None:
-    try:
-        with path.open("rb") as file:
-            beginning = file.read(len(HDF5_SIGNATURE))
-    except FileNotFoundError:
-        raise FileError(
-            f"there is no checkpoint {path}.\nTry: `ls {path.parent}` for those there are."
-        ) from None
-    except OSError as error:
-        raise FileError(
-            f"cannot read {path}: {error.strerror}.\nTry: the path of a checkpoint_*.h5 file."
-        ) from error
-    if beginning != HDF5_SIGNATURE:
-        raise FileError(
+def _stored(path: Path, file: io.FileIO) -> tuple[dict[str, np.ndarray], dict[str, str]]:
+    """The datasets and texts of an open file, which HDF5 sees once its digest is right."""
+    if file.read(len(stored.SIGNATURE)) != stored.SIGNATURE:
+        raise Damaged(
             f"{path} is not an HDF5 file, so not a checkpoint.\n"
             "Try: a file checkpoint_*.h5 from the directory checkpoints of a run."
         )
+    sealed = False
+    try:
+        sealed = is_sealed(file)
+        if not sealed:  # by an older version, or cut
+            stored.check_apart(file, FORMAT_VERSION)
+        return stored.load(file, FORMAT_VERSION)
+    except ValueError as error:
+        raise _damaged(path, str(error)) from error
+    except Refused as refused:
+        raise _refusal(path, refused, sealed) from refused
 
 
-def _private_group(path: Path, file: h5py.File) -> h5py.Group:
-    if GROUP not in file or "format_version" not in file[GROUP].attrs:
-        raise FileError(
-            f"{path} is an HDF5 file but not a checkpoint of sph: it has no group /{GROUP}.\n"
-            "Try: a file checkpoint_*.h5 from the directory checkpoints of a run."
-        )
-    version = int(file[GROUP].attrs["format_version"])
-    if version != FORMAT_VERSION:
+def _damaged(path: Path, what: str) -> Damaged:
+    return Damaged(f"{path} is truncated or damaged ({what}).\n{START_ELSEWHERE}")
+
+
+def _refusal(path: Path, refused: Refused, sealed: bool) -> FileError:
+    """The error for what `stored` refused. A file that is as it was written is not damaged."""
+    if refused.kind == "format":
+        version = int(refused.text)
         age, remedy = (
             ("a newer", "a newer sph")
             if version > FORMAT_VERSION
             else ("an older", "the sph that wrote it, or start the run anew")
         )
-        raise FileError(
+        return FileError(
             f"{path} is of {age} format ({version}) than this sph {__version__} reads "
             f"({FORMAT_VERSION}).\nTry: {remedy}."
         )
-    return file[GROUP]
+    if refused.kind == "damaged":
+        return _damaged(path, refused.text)
+    kind = FileError if sealed else Damaged
+    return kind(
+        f"{path} is an HDF5 file but not a checkpoint of sph: {refused.text}.\n"
+        "Try: a file checkpoint_*.h5 from the directory checkpoints of a run."
+    )
 
 
-def _check_hashes(state: dict[str, np.ndarray], attributes: dict) -> None:
-    if state_hash(state) != attributes["sha256"]:
-        raise ValueError("the state does not match its SHA-256")
-    if _text_hash(attributes["configuration"]) != attributes["configuration_sha256"]:
-        raise ValueError("the configuration does not match its SHA-256")
+def _check_hashes(path: Path, state: dict[str, np.ndarray], texts: dict[str, str]) -> None:
+    if state_hash(state) != texts["sha256"]:
+        raise _damaged(path, "the state does not match its SHA-256")
+    if _text_hash(texts["configuration"]) != texts["configuration_sha256"]:
+        raise _damaged(path, "the configuration does not match its SHA-256")
+
+
+def _check_state(path: Path, checkpoint: Checkpoint) -> None:
+    faults = validity.faults_of_shape(checkpoint)
+    if not faults and PART not in checkpoint.lineage:  # a part shows numbers that are wrong
+        faults = validity.faults_of_value(checkpoint)
+    if faults:
+        raise FileError(
+            f"{path} does not hold the state of a run: {'; '.join(faults)}.\n{START_ELSEWHERE}"
+        )
+
+
+def _lineage(path: Path, text: str) -> tuple[str, ...]:
+    try:
+        lineage = json.loads(text)
+    except (ValueError, RecursionError):
+        lineage = None
+    if not isinstance(lineage, list) or not all(isinstance(one, str) for one in lineage):
+        raise _damaged(path, "its lineage is not a list of texts")
+    return tuple(lineage)
 
 
 def _config(path: Path, text: str) -> configuration.Config:
     try:
         return configuration.from_text(text, f"the configuration in {path}")
-    except ConfigError as error:
+    except (ConfigError, RecursionError) as error:
         raise FileError(
             f"{path} holds a configuration that this sph {__version__} does not take: {error}\n"
             "Try: the sph that wrote it, or start the run anew."

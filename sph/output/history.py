@@ -2,6 +2,7 @@
 
 import csv
 import io
+import math
 import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -9,9 +10,22 @@ from pathlib import Path
 import numpy as np
 
 from sph.errors import FileError
-from sph.output.files import explained, write_text
+from sph.output.files import check_in_place, explained, open_to_append, read_text, write_text
 
 TEXT_COLUMNS = {"limiter"}
+OF_SOME_SCENES = ("held_supports", "volume_ratio", "potential_energy", "energy_added")
+
+# Columns that a restart counts on from.
+COUNTED = (
+    "t", "kinetic_energy", "kinetic_energy_without_bulk", "internal_energy", "energy_drift",
+    "energy_injected", "wall_seconds", "cpu_seconds", "potential_energy", "energy_added",
+)  # fmt: skip
+ALONE = (
+    "copy the checkpoint out of the run directory: `sph restart COPY -o DIR` goes on from it with "
+    "a new history."
+)
+# Sums over particles in another order differ by round-off; those of another state by far more.
+SAME_SUM = 1e-6
 
 
 def columns(dimension: int) -> list[str]:
@@ -49,8 +63,7 @@ class History:
         self.columns = tuple(names)
         self._lines = io.StringIO()
         self._writer = csv.writer(self._lines, lineterminator="\n")
-        with explained(f"cannot write {path}"):
-            self._descriptor = os.open(path, os.O_WRONLY | os.O_APPEND)
+        self._descriptor = open_to_append(path)
 
     @classmethod
     def create(cls, path: Path, dimension: int, extra: Sequence[str] = ()) -> "History":
@@ -72,27 +85,38 @@ class History:
         self._writer.writerow([row[name] for name in self.columns])
 
     def flush(self) -> None:
-        """Write what was added, for readers and before a checkpoint. Raises FileError."""
+        """Write what was added and sync it, before a checkpoint that counts on it.
+
+        Raises FileError, also where the file is no longer in its place.
+        """
         unwritten = self._lines.getvalue().encode()
+        if not unwritten:
+            return
+        check_in_place(self.path, self._descriptor)
         self._lines.seek(0)
         self._lines.truncate()
         with explained(f"cannot write {self.path}"):
             # one call as a rule, so that a reader sees whole lines
             while unwritten:
                 unwritten = unwritten[os.write(self._descriptor, unwritten) :]
+            os.fsync(self._descriptor)
 
     def close(self) -> None:
         """Flush and close. Raises FileError."""
-        self.flush()
-        os.close(self._descriptor)
+        try:
+            self.flush()
+        finally:
+            os.close(self._descriptor)
 
 
 def read(path: Path) -> dict[str, np.ndarray]:
     """The columns of a history, each (steps,): float64, or object where they hold text.
 
-    A last line that is not yet complete is left out. Raises FileError.
+    A last line that is not yet complete is left out. Raises FileError, also where a column that
+    every run has is missing.
     """
     names, rows = _names_and_rows(Path(path))
+    _check_columns(Path(path), names, columns(1))
     by_column = zip(*rows, strict=True) if rows else [()] * len(names)
     return {
         name: np.array(values, dtype=object if name in TEXT_COLUMNS else np.float64)
@@ -100,18 +124,69 @@ def read(path: Path) -> dict[str, np.ndarray]:
     }
 
 
+def check(
+    path: Path, dimension: int, diagnostics: Sequence[str], step: int, sums: Mapping[str, float]
+) -> None:
+    """Raise FileError where a restart cannot go on from `step` of this history.
+
+    Its steps must follow one another from the first row to that one, whose values must be finite
+    and those of `sums`. diagnostics: the problem's own columns.
+    """
+    path = Path(path)
+    names, rows = _names_and_rows(path)
+    ours = columns(dimension)
+    _check_columns(path, names, [*ours, *diagnostics])
+    foreign = [one for one in names if one not in (*ours, *diagnostics, *OF_SOME_SCENES)]
+    if foreign:
+        raise _of_another_run(path, f"it has columns {', '.join(foreign)}")
+    kept = [row for row in rows if int(row[0]) <= step]
+    first = int(kept[0][0]) if kept else step
+    for expected, row in enumerate(kept, start=first):
+        if int(row[0]) != expected:
+            raise _of_another_run(path, f"step {expected} is missing before step {row[0]}")
+        values = dict(zip(names, row, strict=True))
+        for name in COUNTED:
+            if not math.isfinite(float(values.get(name, 0.0))):
+                raise _of_another_run(path, f"{name} = {values[name]} at step {expected}")
+    if first + len(kept) - 1 != step:
+        raise _of_another_run(path, f"step {step}, that of the checkpoint, is missing")
+    for name, value in sums.items():
+        if not math.isclose(float(values[name]), value, rel_tol=SAME_SUM):
+            raise _of_another_run(
+                path, f"{name} = {values[name]} at step {step}, but {value!r} in the checkpoint"
+            )
+
+
+def _of_another_run(path: Path, why: str) -> FileError:
+    return FileError(
+        f"{path} is damaged or not of this run: {why}.\nTry: an earlier checkpoint; or {ALONE}"
+    )
+
+
+def _check_columns(path: Path, names: Sequence[str], needed: Sequence[str]) -> None:
+    missing = [name for name in needed if name not in names]
+    if missing:
+        raise FileError(
+            f"{path} lacks the columns {', '.join(missing)}: its first line is damaged, or another "
+            f"version of sph wrote it.\nTry: the sph that wrote it; or {ALONE}"
+        )
+
+
 def _names_and_rows(path: Path) -> tuple[list[str], list[list[str]]]:
     """The header and the complete rows of `path`."""
     try:
-        text = path.read_bytes().decode()
+        text = read_text(path)
     except FileNotFoundError:
         raise FileError(f"there is no history {path}.\nTry: the directory of a run.") from None
-    except (OSError, UnicodeDecodeError) as error:
+    except UnicodeDecodeError as error:
         raise FileError(f"cannot read {path}: {error}.") from error
     complete = text[: text.rfind("\n") + 1]
     names, *rows = list(csv.reader(io.StringIO(complete))) or [[]]
-    if names[:2] != ["step", "t"]:
-        raise FileError(f"{path} is not a history: its first line must begin with step,t.")
+    if names[:2] != ["step", "t"] or len(set(names)) < len(names):
+        raise FileError(
+            f"{path} is not a history: its first line must begin with step,t and name each column "
+            "once.\nTry: the directory of a run."
+        )
     for number, row in enumerate(rows, start=2):
         if not _is_row(names, row):
             raise FileError(

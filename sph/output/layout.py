@@ -81,7 +81,8 @@ def in_frame(frame: Frame, boundaries: tuple[str, ...], position: np.ndarray) ->
     for axis, boundary in enumerate(boundaries):
         x = position[axis] - frame.origin[axis]
         if boundary == "periodic":
-            x %= frame.size[axis]
+            outside = np.flatnonzero(~((x > 0.0) & (x < frame.size[axis])))
+            x[outside] %= frame.size[axis]  # the remainder of all would take ten times as long
             # the remainder of a number just below 0 rounds up to the size itself
             x[x >= frame.size[axis]] = 0.0
         coordinates[:, axis] = x

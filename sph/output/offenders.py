@@ -7,14 +7,11 @@ import numpy as np
 from sph.domain import Domain
 from sph.errors import FileError
 from sph.output import checkpoint as checkpoints
-from sph.output.checkpoint import Checkpoint
+from sph.output.checkpoint import PART, Checkpoint
 from sph.particles import Particles
 
 # Lines of the table: with the words around it, one screen.
 SHOWN = 8
-
-# Last in the lineage of such a file, which no run goes on from: the rest of the gas is missing.
-PART = "a particle that failed and its neighbours, alone"
 
 
 def leave(path: Path, state: Checkpoint, identity: int) -> str:

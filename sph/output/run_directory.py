@@ -13,15 +13,30 @@ from pathlib import Path
 import numpy as np
 
 from sph.errors import FileError
-from sph.output import checkpoint, history
-from sph.output.files import explained, is_unfinished, remove_unfinished, write_text
+from sph.output import checkpoint, history, same_run
+from sph.output.checkpoint import Checkpoint
+from sph.output.files import (
+    Damaged,
+    explained,
+    holding,
+    is_unfinished,
+    opened,
+    read_text,
+    refuse_link,
+    remove_unfinished,
+    write_text,
+)
 from sph.output.json_text import json_text
+from sph.shell_words import quoted
 
 CHECKPOINT_NAME = re.compile(r"checkpoint_(\d{6,})\.h5")
 
 # A checkpoint of a run that failed is good while energy has drifted by less than this part of
 # physics.max_energy_drift: before a collapse the drift grows by more than that from step to step.
 GOOD = 0.1
+
+# Bytes of a history that is read to see whether it ends after its first step: a row has some 500.
+LONGEST_BEGINNING = 100_000
 
 # First line of config.toml: what tells a run directory from a user's folder of the same look,
 # before --force may remove anything from it.
@@ -51,6 +66,7 @@ class RunDirectory:
                     f"{path} is not a run directory, and it holds other things.\n"
                     "Try: a new directory, with -o."
                 )
+            refuse_link(run._checkpoint_directory)
             run._checkpoint_directory.mkdir(parents=True, exist_ok=True)
             with run.alone():
                 if there:
@@ -65,6 +81,7 @@ class RunDirectory:
         if not run._checkpoint_directory.is_dir():
             there = "is not a run directory" if run.path.exists() else "does not exist"
             raise FileError(f"{path} {there}.\nTry: the directory that `sph run` named, with -o.")
+        refuse_link(run._checkpoint_directory)
         return run
 
     @property
@@ -110,22 +127,26 @@ class RunDirectory:
     def has_failed(self) -> bool:
         """Whether the summary says so."""
         try:
-            found = json.loads(self.summary.read_text(encoding="utf-8"))
-        except (OSError, ValueError):
+            found = json.loads(read_text(self.summary))
+        except (OSError, FileError, ValueError, RecursionError):
             return False
         return isinstance(found, dict) and found.get("status") == "failed"
 
     def latest(self) -> Path:
-        """The last checkpoint that can be read. Raises FileError where there is none."""
-        reason = "it has no checkpoints"
+        """The last checkpoint that is not damaged.
+
+        Raises Damaged where there is none, FileError where a later one cannot be judged: it may be
+        good.
+        """
+        reason = "it has no checkpoints.\nTry: `sph run`, from the start"
         for path in reversed(self.checkpoints()):
             try:
                 checkpoint.read(path)
-            except FileError as error:
+            except Damaged as error:
                 reason = str(error)
             else:
                 return path
-        raise FileError(f"{self.path} cannot be restarted: {reason}")
+        raise Damaged(f"{self.path} cannot be restarted: {reason}")
 
     def last_good(self) -> Path:
         """Of a run that failed, the last checkpoint from which energy had hardly drifted.
@@ -133,14 +154,40 @@ class RunDirectory:
         A step that goes wrong is found some steps later: a checkpoint written in between holds the
         wrong state already. Raises FileError where none can be read.
         """
+        if not self.history.exists():
+            return self.latest()
         drifts = history.read(self.history)
         drift = dict(zip(drifts["step"], np.abs(drifts["energy_drift"]), strict=True))
         for path in reversed(self.checkpoints()):
-            with suppress(FileError):
+            with suppress(Damaged):
                 one = checkpoint.read(path)
                 if drift.get(one.step, 0.0) <= GOOD * one.config.physics.max_energy_drift:
                     return path
         return self.latest()
+
+    def check_belongs(self, path: Path, state: Checkpoint, into: Path | None = None) -> None:
+        """Raise FileError where the directory holds what is not of the run of checkpoint `path`.
+
+        `state` is what that holds. Looked at are the configuration, the history, the checkpoint
+        before and, unless the run goes on `into` another directory, all later ones, which it
+        replaces. A damaged one is no obstacle.
+        """
+        same_run.check_configuration(self.config, state)
+        number = checkpoint_number(path)
+        if number or self.history.exists():  # the first may be a copy that no run went on from yet
+            same_run.check_history(self.history, state)
+        numbers = {checkpoint_number(one): one for one in self.checkpoints()}
+        for other in sorted((one for one in numbers if one < number), reverse=True):
+            with suppress(Damaged):
+                before = checkpoint.read(numbers[other])
+                same_run.check_order(numbers[other], path, before, state)
+                break
+        stays = into is None or into.resolve() == self.path.resolve()
+        for other in sorted(one for one in numbers if one > number and stays):
+            with suppress(Damaged):
+                after = checkpoint.read(numbers[other])
+                same_run.check_order(path, numbers[other], state, after)
+                path, state = numbers[other], after
 
     def drop_checkpoints_after(self, number: int) -> None:
         """Remove later checkpoints, and what a killed run left unfinished. Raises FileError."""
@@ -165,10 +212,13 @@ class RunDirectory:
     def alone(self) -> Iterator[None]:
         """Hold the directory against other processes meanwhile. Raises FileError where one has it.
 
+        Files are written to this very directory, also if another takes its place.
         Where the file system knows no locks, nothing is held.
         """
         with explained(f"cannot open {self.path}"):
-            descriptor = os.open(self._checkpoint_directory, os.O_RDONLY)
+            flags = os.O_RDONLY | os.O_DIRECTORY
+            home = os.open(self.path, flags)
+            descriptor = os.open("checkpoints", flags | os.O_NOFOLLOW, dir_fd=home)
         try:
             try:
                 fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
@@ -179,16 +229,18 @@ class RunDirectory:
                 ) from None
             except OSError:
                 pass  # this file system has no locks
-            yield
+            with holding({self.path: home, self._checkpoint_directory: descriptor}):
+                yield
         finally:
             os.close(descriptor)
+            os.close(home)
 
     def _make_room(self, force: bool) -> None:
-        begun = self.history.exists() or self.checkpoints()
+        begun = self.checkpoints() or (self.history.exists() and not self._ended_at_once())
         if begun and not force:
             raise FileError(
                 f"{self.path} holds a run already.\nTry: --force to replace it, "
-                f"`sph restart {self.path}` to go on with it, or another directory with -o."
+                f"`sph restart {quoted(self.path)}` to go on with it, or another directory with -o."
             )
         for tree in (self.figures, self.diagnostics):
             if tree.is_dir() and not tree.is_symlink():
@@ -196,6 +248,13 @@ class RunDirectory:
         for path in (self.history, self.summary, self.offenders, *self.checkpoints()):
             path.unlink(missing_ok=True)
         self.write_config("")  # its mark stays: beside a user's files this is still a run directory
+
+    def _ended_at_once(self) -> bool:
+        """Whether its run ended before its first checkpoint, so that nothing is lost with it."""
+        if self.summary.exists():
+            return False
+        with opened(self.history) as file:
+            return file.read(LONGEST_BEGINNING + 1).count(b"\n") <= 2
 
     def _remove_unfinished(self) -> None:
         for directory in (self.path, self._checkpoint_directory):
@@ -228,10 +287,11 @@ def find(run_or_checkpoint: Path) -> tuple[RunDirectory | None, Path]:
 
 def _is_run(run: RunDirectory) -> bool:
     try:
-        marked = run.config.read_bytes().startswith(MARK.encode())
-    except OSError:
+        with opened(run.config) as file:
+            marked = file.read(len(MARK)) == MARK.encode()
+    except (OSError, FileError):
         return False
-    return marked and run.path.joinpath("checkpoints").is_dir()
+    return marked and run._checkpoint_directory.is_dir()
 
 
 def _holds_nothing(directory: Path) -> bool:

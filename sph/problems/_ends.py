@@ -45,5 +45,17 @@ def of(boundary: str, low: riemann.State, high: riemann.State, eos) -> Ends:
     )
 
 
+def opens_vacuum(boundary: str, low: riemann.State, high: riemann.State, eos) -> bool:
+    """Whether gas leaves the ends of that axis faster than it can expand, arguments as of `of`."""
+    if boundary == "open":
+        return False
+    if not is_gamma_law(eos):
+        return low.velocity > 0.0 or high.velocity < 0.0  # not known to stay together
+    pairs = [(high, low)]
+    if boundary == "mirror":
+        pairs = [(_mirrored(low), low), (high, _mirrored(high))]
+    return any(riemann.star_state(*pair, eos).vacuum for pair in pairs)
+
+
 def _mirrored(state: riemann.State) -> riemann.State:
     return state._replace(velocity=-state.velocity)

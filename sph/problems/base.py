@@ -53,8 +53,9 @@ class Problem(Section):
                  configuration must keep, each with the reason for the number
       ideal_gas  whether its solution is that of an ideal gas, so that others are refused
       radial     whether, in 2-D and 3-D, the solution depends on the distance from `centre` alone
-      fills_box  whether the gas fills the box, so that in a closed one sum m/rho is its volume
       swamped    figures beyond whose bound the problem's small signal is lost in numerical noise
+      truth      what `exact` is, in words and as the label of a line: an exact solution, or a
+                 reference that another method computes
       profiled   whether profiles over x, or that distance, show the solution; maps do else
     """
 
@@ -63,8 +64,8 @@ class Problem(Section):
     limits: ClassVar[dict[str, Limit]] = {}
     ideal_gas: ClassVar[bool] = False
     radial: ClassVar[bool] = False
-    fills_box: ClassVar[bool] = True
     swamped: ClassVar[dict[str, Limit]] = {}
+    truth: ClassVar[tuple[str, str]] = ("the exact solution", "exact")
     profiled: ClassVar[bool] = True
 
     name: str = Field(description="which problem: `sph list` names them")
@@ -95,6 +96,10 @@ class Problem(Section):
     def centre(self) -> np.ndarray:
         """(D,) the middle of the box."""
         return self.box.mean(axis=1)
+
+    def fills_box(self, eos) -> bool:
+        """Whether gas fills the box at all times: in a closed one, sum m/rho is then its volume."""
+        return True
 
     def allowed(self) -> dict[str, Limit]:
         """The limits that a run of this very configuration must keep, or its summary warns."""

@@ -36,6 +36,7 @@ class Problem(base.Problem):
         "time.end": 0.038,
         "output.interval": 0.0095,
     }
+    truth: ClassVar = finite_volume.TRUTH
     limits: ClassVar = {
         "energy_drift": base.Limit(1e-4, "as in the shock tubes; 2e-5 was measured"),
         "density_L1_relative": base.Limit(

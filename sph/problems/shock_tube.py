@@ -184,6 +184,12 @@ class Problem(base.Problem):
         low, high = self.error_range
         return (low < position[0]) & (position[0] < high), f"{low:g} < x < {high:g}"
 
+    def fills_box(self, eos) -> bool:
+        """Unless vacuum opens at the diaphragm or at an end."""
+        states = self._states()
+        apart = not is_gamma_law(eos) or riemann.star_state(*states, eos).vacuum
+        return not (apart or _ends.opens_vacuum(self.boundaries[0], *states, eos))
+
     def undisturbed(self, eos, time: float) -> np.ndarray:
         found = super().undisturbed(eos, time)
         found[0] = self._ends(eos).between(self.box[0], time)

@@ -40,6 +40,7 @@ class Problem(base.Problem):
         "time.end": 1.8,
         "output.interval": 0.3,
     }
+    truth: ClassVar = finite_volume.TRUTH
     limits: ClassVar = {
         "energy_drift": base.Limit(
             1e-4, "a shock of moderate strength, as in the shock tubes, which keep to 1e-5"

@@ -93,6 +93,11 @@ class Problem(base.Problem):
             "internal_energy": eos.internal_energy(density, pressure),
         }
 
+    def fills_box(self, eos) -> bool:
+        """Unless it leaves a wall faster than it can expand."""
+        walls = zip(self.boundaries, self._states(), strict=True)
+        return not any(_ends.opens_vacuum(kind, state, state, eos) for kind, state in walls)
+
     def undisturbed(self, eos, time: float) -> np.ndarray:
         return np.array(
             [ends.between(box, time) for ends, box in zip(self._ends(eos), self.box, strict=True)]
@@ -132,8 +137,9 @@ class Problem(base.Problem):
 
     def _ends(self, eos) -> list[_ends.Ends]:
         """The waves from the ends of each axis."""
-        gas = [riemann.State(self.density, float(v), self.pressure) for v in self._velocity]
-        return [
-            _ends.of(boundary, state, state, eos)
-            for boundary, state in zip(self.boundaries, gas, strict=True)
-        ]
+        axes = zip(self.boundaries, self._states(), strict=True)
+        return [_ends.of(boundary, state, state, eos) for boundary, state in axes]
+
+    def _states(self) -> list[riemann.State]:
+        """The gas, with its velocity along each axis."""
+        return [riemann.State(self.density, float(v), self.pressure) for v in self._velocity]

@@ -4,11 +4,11 @@ Each is a run directory like any other, named after its value. One that has ende
 never run again; one that was killed goes on from its last checkpoint.
 """
 
-import sys
 from collections.abc import Sequence
 from pathlib import Path
 
 from sph import config as configuration
+from sph import standard_streams
 from sph.errors import ConfigError, FileError, NumericalError, Stopped, first_line
 from sph.stability.criterion import NONE, Criterion, Judge, Trial
 from sph.sweep import local
@@ -101,4 +101,4 @@ class Trials:
 
     def _say(self, trial: Trial) -> None:
         reason = f": {trial.reason}" if trial.reason else ""
-        print(f"{self.key} = {trial.value:g}: {trial.verdict}{reason}", file=sys.stderr, flush=True)
+        standard_streams.note(f"{self.key} = {trial.value:g}: {trial.verdict}{reason}")

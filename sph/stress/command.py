@@ -4,12 +4,12 @@ Each case is a sweep in a directory of its own, whose points are the case's sett
 pool of processes, and what is done is not done again.
 """
 
-import sys
 import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 
-from sph.errors import Stopped
+from sph import standard_streams
+from sph.errors import FileError, Stopped
 from sph.output.files import explained, write_text
 from sph.stress import table
 from sph.stress.case import Case, load
@@ -47,12 +47,15 @@ def run(
 ) -> tuple[Suite, list[Result]]:
     """Bring the cases of these names to their end and judge them; writes stress.json and .md.
 
-    Raises ConfigError and FileError before anything runs, Stopped where a run was stopped.
+    Raises ConfigError before anything runs, FileError also where a run could not write, and Stopped
+    where one was stopped.
     """
     suite = Suite(load(only), directory)
     missing = [task for _, _, task in suite.runs.values() if not _has_ended(task)]
     told = _Told(suite, len(missing))
     local.run(missing, jobs, told)
+    if told.unwritten:
+        raise FileError(told.unwritten)
     if told.stopped:
         raise Stopped(
             f"{told.stopped} of {len(suite.runs)} runs have not ended; the same command goes on "
@@ -73,6 +76,7 @@ class _Told:
         self.all = len(suite.runs)
         self.ended = self.all - missing
         self.stopped = 0
+        self.unwritten = ""  # by which run, and why: no verdict on its method
         if self.ended:
             self._say(f"{self.ended} of {self.all} runs are done already")
 
@@ -81,12 +85,14 @@ class _Told:
             self.stopped += 1
             self._say(f"{outcome.name} stopped: {outcome.reason}")
             return
+        if outcome.code == FileError.exit_code:
+            self.unwritten = f"{outcome.name}: {outcome.reason}"
         self.ended += 1
         verdict = self.suite.result(outcome.name).verdict
         self._say(f"[{self.ended:{len(str(self.all))}d}/{self.all}] {outcome.name}: {verdict}")
 
     def _say(self, line: str) -> None:
-        print(line, file=sys.stderr, flush=True)
+        standard_streams.note(line)
 
 
 def _point(case: Case, setting: str) -> Point:

@@ -3,13 +3,14 @@
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from sph import progress
+from sph import progress, standard_streams
 from sph.errors import ConfigError, NumericalError, Stopped
 from sph.sweep import distributed, local, slurm
 from sph.sweep.manifest import SweepDirectory
 from sph.sweep.plan import Plan
 from sph.sweep.task import Outcome, Task, tasks
 
+ASKED_ABOVE = 1000  # points, from which on a slip of the keyboard is likely
 MARKS = {"done": "done", "failed": "FAILED", "stopped": "stopped"}
 
 
@@ -21,15 +22,23 @@ def run(
     jobs: int | None = None,
     scheduler: str | None = None,
     slurm_options: Sequence[str] = (),
+    is_sure: bool = False,
 ) -> str:
     """Bring all points of a sweep to their end; returns the closing words.
 
-    Raises ConfigError and FileError before anything runs; NumericalError where a point failed and
+    Raises ConfigError and FileError before anything runs, ConfigError also for more than
+    ASKED_ABOVE points unless the user `is_sure`; NumericalError where a point failed and
     Stopped where one was stopped, after all others have run.
     """
     if scheduler and slurm_options:
         raise ConfigError("--scheduler and --slurm: a sweep runs at one of the two")
     plan = Plan.of(varies, overrides)
+    points = len(plan.points)
+    if points > ASKED_ABOVE and not is_sure:
+        raise ConfigError(
+            f"--vary: these are {points:,} points.\nTry: fewer values, or --yes to run them all."
+        )
+    standard_streams.note(f"{points} {'point' if points == 1 else 'points'} to check and run")
     sweep = SweepDirectory(directory.absolute())
     sweep.prepare(config, plan)
     everything = tasks(sweep, plan)

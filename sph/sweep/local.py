@@ -1,24 +1,25 @@
 """Points on this machine: a few processes at a time, which share its processors."""
 
-import os
+import signal
 from collections.abc import Callable, Sequence
 from concurrent.futures import FIRST_COMPLETED, ThreadPoolExecutor, wait
 from dataclasses import replace
 
 from sph.stop_signals import stop_signals
 from sph.sweep.task import POLL, Outcome, Task, chooses_threads, execute
+from sph.threads import available_processors
 
 
 def run(tasks: Sequence[Task], jobs: int | None, tell: Callable[[Outcome], None]) -> None:
     """Run every task, `jobs` at once (as many as processors if None); `tell` hears of each.
 
     The first SIGINT or SIGTERM lets runs that have begun write a checkpoint and begins no more;
-    a second SIGINT ends them at once and raises KeyboardInterrupt.
+    a second one ends them at once and raises KeyboardInterrupt.
     """
     processors = available_processors()
     jobs = min(jobs or processors, len(tasks)) or 1
     asked = 0
-    with stop_signals() as came, ThreadPoolExecutor(jobs) as pool:
+    with stop_signals(signal.default_int_handler) as came, ThreadPoolExecutor(jobs) as pool:
         pending = {
             pool.submit(execute, task, lambda: asked)
             for task in share_threads(tasks, max(1, processors // jobs))
@@ -37,10 +38,3 @@ def run(tasks: Sequence[Task], jobs: int | None, tell: Callable[[Outcome], None]
 def share_threads(tasks: Sequence[Task], threads: int) -> list[Task]:
     """The tasks with `threads` each, where the user did not give run.threads."""
     return [task if chooses_threads(task) else replace(task, threads=threads) for task in tasks]
-
-
-def available_processors() -> int:
-    """Processors that this process may use."""
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1

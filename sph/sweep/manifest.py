@@ -16,7 +16,7 @@ from sph import config as configuration
 from sph.config import Config, reading
 from sph.config.toml_text import key_text, value_text
 from sph.errors import ConfigError, FileError
-from sph.output.files import explained, write_text
+from sph.output.files import explained, is_unfinished, read_text, refuse_link, write_text
 from sph.output.run_directory import RunDirectory
 from sph.sweep.plan import Plan, Point
 from sph.version import __version__
@@ -51,11 +51,12 @@ class SweepDirectory:
         """The plan in sweep.toml. Raises FileError where there is none that can be read."""
         try:
             found = tomllib.loads(self.manifest.read_text(encoding="utf-8"))
-            points = tuple(Point(name, tuple(found["points"][name])) for name in found["points"])
-            return Plan(tuple(found["set"]), found["vary"], points)
+            points = tuple(Point(name, _texts(one)) for name, one in found["points"].items())
+            varied = {key: list(_texts(values)) for key, values in found["vary"].items()}
+            return Plan(_texts(found["set"]), varied, points)
         except OSError as error:
             raise FileError(f"{self.manifest} cannot be read: {error.strerror}") from None
-        except (ValueError, KeyError, TypeError, AttributeError):
+        except (ValueError, KeyError, TypeError, AttributeError, RecursionError):
             raise FileError(
                 f"{self.manifest} is not the manifest of a sweep.\n{OTHER_DIRECTORY}"
             ) from None
@@ -71,8 +72,9 @@ class SweepDirectory:
             if self.is_one:
                 plan = self._extended(plan, resolved)
             elif self.path.exists():
-                self._refuse_other_things()
+                self._refuse_other_things(reading.read(config))
             self._refuse_other_runs(resolved)
+            refuse_link(self.logs)
             self.logs.mkdir(parents=True, exist_ok=True)
         if not self.is_one:
             write_text(self.base, reading.read(config))
@@ -81,7 +83,7 @@ class SweepDirectory:
     def failures(self) -> dict[str, str]:
         """Reasons of points whose last attempt failed, by name."""
         found = sorted(self.logs.glob("*.failed"))
-        return {path.stem: path.read_text(encoding="utf-8").strip() for path in found}
+        return {path.stem: reason_in(path) for path in found}
 
     def _extended(self, plan: Plan, resolved: dict[str, Config]) -> Plan:
         """The plan that is here and what the new one adds. Raises ConfigError if they differ."""
@@ -109,12 +111,28 @@ class SweepDirectory:
                 there = configuration.load(run.config)
                 _refuse_change(f"{run.path} holds a run", there, config)
 
-    def _refuse_other_things(self) -> None:
-        if not self.path.is_dir() or any(self.path.iterdir()):
+    def _refuse_other_things(self, base: str) -> None:
+        """Raise FileError where the directory holds more than what a sweep killed here left."""
+        there = set()
+        if self.path.is_dir():
+            there = {one for one in self.path.iterdir() if not is_unfinished(one.name)}
+        logs = {self.logs} if self.logs.is_dir() and not any(self.logs.iterdir()) else set()
+        ours = (
+            {self.base} if logs and self.base in there and read_text(self.base) == base else set()
+        )
+        if not self.path.is_dir() or there - logs - ours:
             raise FileError(
                 f"{self.path} is there already, and is not the directory of a sweep.\n"
                 f"{OTHER_DIRECTORY}"
             )
+
+
+def reason_in(path: Path) -> str:
+    """What a `.failed` file says, whatever it holds."""
+    try:
+        return path.read_text(encoding="utf-8", errors="replace").strip() or "no reason was kept"
+    except OSError as error:
+        return f"the reason cannot be read: {error.strerror}"
 
 
 def has_checkpoints(run: RunDirectory) -> bool:
@@ -143,6 +161,13 @@ def _differences(there: Config, now: Config) -> list[str]:
         for key in before[table] | after[table]
         if before[table].get(key) != after[table].get(key)
     ]
+
+
+def _texts(values) -> tuple[str, ...]:
+    """A list of texts. Raises TypeError for anything else."""
+    if not isinstance(values, list) or not all(isinstance(one, str) for one in values):
+        raise TypeError
+    return tuple(values)
 
 
 def _text(plan: Plan) -> str:

@@ -7,18 +7,21 @@ import re
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
+from decimal import Decimal
 from pathlib import Path
 
 from sph import config as configuration
 from sph.errors import ConfigError
 
 _NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
-_RANGE = re.compile(rf"({_NUMBER}):({_NUMBER}):(x|\+|-)(\d.*|\.\d.*)")
+_RANGE = re.compile(rf"({_NUMBER}):({_NUMBER}):(x|\+|-)([\d.].*)", re.ASCII | re.DOTALL)
 RANGE_FORM = "FIRST:LAST:xFACTOR, FIRST:LAST:+STEP or FIRST:LAST:-STEP"
 
-# An end within this share of a step is met: 0.05 + 5 x 0.05 is not 0.3 in binary numbers.
-ROUNDING = 1e-6
+# A last value within this share of a step is met, as 2 is by 1:2:x1.414214.
+ROUNDING = Decimal("1e-6")
+DIGITS = 12  # of a value of a geometric range: as many as powers of a rounded factor can claim
 MOST_VALUES = 10_000  # of one key: more is a slip of the keyboard
+MOST_POINTS = 100_000  # directories in one directory, and configurations in memory
 
 # File systems take 255 bytes; a name must also be readable in a table.
 LONGEST_NAME = 100
@@ -49,6 +52,9 @@ class Plan:
             if key in varied:
                 raise ConfigError(f"--vary {text}: {key} is varied already; give all its values")
             varied[key] = values
+        if (points := math.prod(map(len, varied.values()))) > MOST_POINTS:
+            raise ConfigError(f"--vary: these are {points:,} points; at most {MOST_POINTS:,} go")
+        _refuse_set_and_varied(overrides, varied)
         return cls(tuple(overrides), varied, _points(varied))
 
     def resolved(self, config: Path) -> dict[str, configuration.Config]:
@@ -66,6 +72,8 @@ class Plan:
                     wrong.setdefault(line, []).append(point.name)
         if wrong:
             raise ConfigError("\n".join(self._told(*item) for item in wrong.items()))
+        if self.varied:
+            _refuse_twins(found)
         return found
 
     def _told(self, line: str, names: list[str]) -> str:
@@ -77,8 +85,8 @@ class Plan:
 
 
 def _varied(text: str) -> tuple[str, list[str]]:
-    key, equals, values = text.partition("=")
-    key = key.strip()
+    name, equals, values = text.partition("=")
+    key = _key(name)
     if not equals or "." not in key or not all(key.split(".")):
         raise ConfigError(f"--vary {text}: expected TABLE.KEY=VALUE,VALUE,…")
     found = [value for part in split(values) for value in expand(part)]
@@ -90,11 +98,34 @@ def _varied(text: str) -> tuple[str, list[str]]:
     return key, found
 
 
+def _key(text: str) -> str:
+    """A key as it is written without blanks."""
+    return ".".join(step.strip() for step in text.split("."))
+
+
+def _refuse_set_and_varied(overrides: Sequence[str], varied: dict[str, list[str]]) -> None:
+    """Raise ConfigError where a value of --vary would replace what --set gives."""
+    for override in overrides:
+        key = _key(override.partition("=")[0])
+        for other in varied:
+            if f"{key}.".startswith(f"{other}."):
+                raise ConfigError(f"--set {override}: {other} is varied; give its values there")
+
+
 def _as_varied(message: str, point: Point) -> str:
     """An error in the words of `--vary`, where it comes from a value of it."""
     for setting in point.settings:
         message = message.replace(f"--set {setting}:", f"--vary {setting}:")
     return message
+
+
+def _refuse_twins(found: dict[str, configuration.Config]) -> None:
+    """Raise ConfigError where two points are one configuration, as 0.5 and 0.50 are."""
+    names: dict[str, str] = {}
+    for name, config in found.items():
+        twin = names.setdefault(config.to_toml(), name)
+        if twin != name:
+            raise ConfigError(f"--vary: {twin} and {name} are the same configuration")
 
 
 # --- values -----------------------------------------------------------------------------------
@@ -122,37 +153,47 @@ def expand(text: str) -> list[str]:
     form = _RANGE.fullmatch(text)
     if not form:
         return [text]
-    first, last, kind, by = form[1], form[2], form[3], form[4]
-    if not re.fullmatch(_NUMBER, by):
-        raise ConfigError(f"{text}: {by} is not a number; expected {RANGE_FORM}")
-    progression = _geometric if kind == "x" else _arithmetic
-    signed = float(by) * (-1.0 if kind == "-" else 1.0)
-    values = progression(text, float(first), float(last), signed)
-    # Digits that rounding did not touch. A whole number stays one if the range begins with one.
-    values = [float(f"{value:.12g}") for value in values]
-    is_whole = re.fullmatch(r"[+-]?\d+", first) and all(value.is_integer() for value in values)
-    return [str(int(value)) if is_whole else repr(value) for value in values]
+    if not re.fullmatch(_NUMBER, form[4], re.ASCII):
+        raise ConfigError(f"{text}: {form[4]} is not a number; expected {RANGE_FORM}")
+    first, last, by = (_number(text, form[part]) for part in (1, 2, 4))
+    if form[3] == "x":
+        values = _geometric(text, first, last, by)
+    else:
+        values = _arithmetic(text, first, last, -by if form[3] == "-" else by)
+    # A whole number stays one if the range begins with one.
+    is_whole = form[1].lstrip("+-").isdecimal() and all(
+        one == one.to_integral_value() for one in values
+    )
+    return [str(int(value)) if is_whole else repr(float(value)) for value in values]
 
 
-def _geometric(text: str, first: float, last: float, factor: float) -> list[float]:
-    if min(first, last, factor) <= 0.0 or factor == 1.0:
+def _number(text: str, number: str) -> Decimal:
+    """Decimal, so that 0.05 + 5 x 0.05 is 0.3. Raises ConfigError for what no float64 can be."""
+    rounded, nothing = float(number), not re.search(r"[1-9]", re.split("[eE]", number)[0])
+    if math.isinf(rounded) or (rounded == 0.0 and not nothing):
+        raise ConfigError(f"{text}: {number} is beyond the range of float64 numbers")
+    return Decimal(number) if rounded else Decimal(0)
+
+
+def _geometric(text: str, first: Decimal, last: Decimal, factor: Decimal) -> list[Decimal]:
+    if min(first, last, factor) <= 0 or factor == 1:
         raise ConfigError(f"{text}: a factor other than 1 and ends above 0 are expected")
-    steps = _steps(text, math.log(last / first) / math.log(factor))
-    return [first * factor**k for k in range(steps + 1)]
+    steps = _steps(text, (last.ln() - first.ln()) / factor.ln())
+    return [Decimal(f"{first * factor**k:.{DIGITS}g}") for k in range(steps + 1)]
 
 
-def _arithmetic(text: str, first: float, last: float, step: float) -> list[float]:
-    if step == 0.0:
+def _arithmetic(text: str, first: Decimal, last: Decimal, step: Decimal) -> list[Decimal]:
+    if step == 0:
         raise ConfigError(f"{text}: a step of 0 leads nowhere")
     return [first + k * step for k in range(_steps(text, (last - first) / step) + 1)]
 
 
-def _steps(text: str, ratio: float) -> int:
+def _steps(text: str, ratio: Decimal) -> int:
     """Whole steps from the first to the last value."""
     if ratio < -ROUNDING:
         raise ConfigError(f"{text}: this leads away from the last value; expected {RANGE_FORM}")
-    if ratio > MOST_VALUES:
-        raise ConfigError(f"{text}: these are more than {MOST_VALUES} values")
+    if ratio > MOST_VALUES - 1:
+        raise ConfigError(f"{text}: these are more than {MOST_VALUES:,} values")
     return math.floor(ratio + ROUNDING)
 
 
@@ -182,5 +223,5 @@ def _name(settings: tuple[str, ...]) -> str:
 
 def _unique(name: str, settings: tuple[str, ...]) -> str:
     """`name`, shortened, with a hash of what it stands for."""
-    digest = hashlib.sha256("\n".join(settings).encode()).hexdigest()[:8]
+    digest = hashlib.sha256("\n".join(settings).encode(errors="surrogatepass")).hexdigest()[:8]
     return f"{name[: LONGEST_NAME - 9]}-{digest}"

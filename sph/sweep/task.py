@@ -8,6 +8,7 @@ So an orphan of a sweep that was killed goes on unharmed, and nobody else touche
 import fcntl
 import json
 import re
+import shlex
 import subprocess
 import sys
 import time
@@ -19,9 +20,9 @@ from typing import BinaryIO, NamedTuple
 
 from sph import warnings
 from sph.errors import FileError, NumericalError, SphError, Stopped
-from sph.output.files import explained, write_text
+from sph.output.files import Damaged, explained, open_to_append, write_text
 from sph.output.run_directory import RunDirectory
-from sph.sweep.manifest import SweepDirectory, has_checkpoints
+from sph.sweep.manifest import SweepDirectory, has_checkpoints, reason_in
 from sph.sweep.plan import Plan, Point
 
 POLL = 0.1  # seconds between two looks at a lock, a child or a wish to stop
@@ -95,7 +96,7 @@ def execute(task: Task, stops: Callable[[], int] = lambda: 0) -> Outcome:
     try:
         if not task.sweep.is_one:
             raise FileError(f"{task.sweep.path} is not there: the sweep's files must be shared")
-        with _locked(task.log, stops) as log:
+        with explained(f"cannot run {task.point.name}"), _locked(task.log, stops) as log:
             if task.status == "done":
                 return _done(task)
             return _attempt(task, log, stops)
@@ -111,7 +112,7 @@ def standing(task: Task) -> Outcome:
     if task.status == "done":
         return _done(task)
     if task.failure.is_file():
-        return Outcome(name, "failed", task.failure.read_text(encoding="utf-8").strip())
+        return Outcome(name, "failed", reason_in(task.failure))
     return Outcome(name, "stopped", "it has not ended")
 
 
@@ -123,8 +124,8 @@ def _done(task: Task, how: str = "") -> Outcome:
 def _attempt(task: Task, log: BinaryIO, stops: Callable[[], int]) -> Outcome:
     task.failure.unlink(missing_ok=True)
     command = task.command()
-    log.write(f"$ sph {' '.join(command[3:])}\n".encode())
-    log.flush()
+    with suppress(OSError):  # the disk is full: the run will say so
+        log.write(f"$ sph {shlex.join(command[3:])}\n".encode(errors="surrogateescape"))
     begin = log.tell()
     # A session of its own: Ctrl-C at the terminal reaches us alone, and we pass it on once.
     child = subprocess.Popen(
@@ -138,7 +139,8 @@ def _attempt(task: Task, log: BinaryIO, stops: Callable[[], int]) -> Outcome:
         reason = f"ended by signal {-code}" if code < 0 else "stopped, with a checkpoint"
         return Outcome(name, "stopped", reason, how)
     reason = _reason(task, code, begin)
-    write_text(task.failure, reason + "\n")
+    with suppress(FileError):  # a full disk must not hide why the run failed
+        write_text(task.failure, reason + "\n")
     return Outcome(name, "failed", reason, how, code)
 
 
@@ -160,7 +162,7 @@ def _wait(child: subprocess.Popen, stops: Callable[[], int]) -> int:
 def _reason(task: Task, code: int, begin: int) -> str:
     """Why an attempt failed: in the summary's words, or the last that the run said."""
     if code == NumericalError.exit_code and task.status == "failed":
-        return _summary(task.run)["reason"]
+        return str(_summary(task.run).get("reason"))
     said = task.log.read_bytes()[begin:].decode(errors="replace").strip()
     message = re.search(r"^sph: (.*)", said, re.MULTILINE | re.DOTALL)
     last = said.splitlines()[-1] if said else "it said nothing"
@@ -170,7 +172,7 @@ def _reason(task: Task, code: int, begin: int) -> str:
 @contextmanager
 def _locked(path: Path, stops: Callable[[], int]) -> Iterator[BinaryIO]:
     """`path`, open to append to and locked, as soon as no process holds it. Raises Stopped."""
-    with explained(f"cannot write {path}"), path.open("ab") as file:
+    with open(open_to_append(path), "ab", buffering=0) as file:
         while True:
             with suppress(BlockingIOError):
                 fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
@@ -197,6 +199,6 @@ def _can_go_on(run: RunDirectory) -> bool:
         return False
     try:
         run.latest()
-    except FileError:
+    except Damaged:
         return False
     return True

@@ -4,6 +4,7 @@ A viscosity is a NamedTuple with the methods
 
     pair_alpha(alpha_i, alpha_j)    alpha of the pair (eq 24)
     start()                         alpha of every particle at t = 0
+    largest()                       the most that alpha may become
 
 and the class attribute `evolves`: False where alpha is one number (constant.py), which then costs
 no array. The others are the files of switches/, and have one method more,

@@ -13,5 +13,8 @@ class ConstantAlpha(NamedTuple):
     def start(self):
         return self.alpha
 
+    def largest(self):
+        return self.alpha
+
     def pair_alpha(self, alpha_i, alpha_j):
         return self.alpha

@@ -17,7 +17,7 @@ from click.testing import CliRunner
 
 import sph
 from sph import config as configuration
-from sph import progress, registry
+from sph import fingerprint, progress, registry, runner
 from sph.cli import main
 from sph.output.checkpoint import state_hash
 from sph.output.run_directory import RunDirectory
@@ -190,6 +190,29 @@ def test_restart_in_place_and_elsewhere(done, tmp_path):
     assert hashes(other) == hashes(run)
 
 
+def test_restart_says_what_else_computed_the_checkpoint(done, tmp_path, monkeypatch):
+    run = copied(done, tmp_path / "run")
+    assert "digits" not in sph_("restart", run, "--set", "time.end=0.201").stderr
+    facts = fingerprint.facts() | {"processor": "another"}
+    monkeypatch.setattr(fingerprint, "facts", lambda: facts)
+    result = sph_("restart", run, "--set", "time.end=0.202")
+    assert result.exit_code == 0
+    assert "may differ in their last digits" in result.stderr
+    assert "here another)" in result.stderr
+    # from here on the other one has computed
+    assert "digits" not in sph_("restart", run, "--set", "time.end=0.203").stderr
+
+
+def test_more_threads_than_processors_are_told(done, config, tmp_path, monkeypatch):
+    monkeypatch.setattr(runner, "available_processors", lambda: 2)
+    asked = ("-o", tmp_path / "run", "--set", "time.end=0.05", "--threads")
+    words = "run.threads = 3, but this process may use 2 processor(s)"
+    assert words not in sph_("run", config, *asked, 2).stderr
+    result = sph_("run", config, "--force", *asked, 3)
+    assert words in result.stderr
+    assert hashes(tmp_path / "run").items() <= hashes(done[0]).items()
+
+
 def test_restart_says_that_it_passes_over_a_damaged_checkpoint(done, tmp_path):
     run = copied(done, tmp_path / "run")
     last = run / "checkpoints" / "checkpoint_000004.h5"
@@ -324,13 +347,13 @@ def test_a_restart_that_cannot_be(done):
 
 def test_numerical_failure(config, tmp_path):
     run = tmp_path / "run"
-    result = sph_(
-        "run", config, "-o", run, "--set", "physics.C=50.0", "--set", "problem.left.pressure=1e3"
-    )
+    result = sph_("run", config, "-o", run, "--set", "physics.max_energy_drift=1e-15")
     first = run / "checkpoints" / "checkpoint_000000.h5"
     assert_told(result, 3, "particle ", "offenders.h5", "Try: ", f"`sph restart {first} --set ")
     assert json.loads((run / "summary.json").read_text())["status"] == "failed"
-    result = sph_("restart", first, "--set", "physics.C=0.15", "--set", "time.end=0.01")
+    result = sph_(
+        "restart", first, "--set", "physics.max_energy_drift=0.02", "--set", "time.end=0.01"
+    )
     assert result.exit_code == 0, result.output
 
 
@@ -342,6 +365,11 @@ def test_missing_files(tmp_path):
     assert_told(sph_("run", tmp_path), 4, "a directory")
     assert_told(sph_("restart", tmp_path / "no"), 4, f"{tmp_path / 'no'} does not exist")
     assert_told(sph_("restart", tmp_path), 4, "is not a run directory")
+
+
+@pytest.mark.parametrize("command", ["restart", "plot", "report"])
+def test_a_name_that_the_file_system_refuses(command):
+    assert_told(sph_(command, "x" * 300), 4, "x" * 300, "File name too long")
 
 
 def test_what_is_no_good_checkpoint(done, tmp_path):
@@ -385,7 +413,7 @@ def test_an_interrupt_while_loading_is_no_traceback(config, monkeypatch):
 
     monkeypatch.setattr(configuration, "load", interrupted)
     result = sph_("run", config)
-    assert_told(result, 1, "Aborted!")
+    assert_told(result, 130, "sph: ended by Ctrl-C")
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM], ids=lambda one: one.name)
@@ -420,14 +448,14 @@ def test_a_second_interrupt_ends_at_once(config, tmp_path, monkeypatch):
         result = sph_("run", config, "-o", tmp_path / "run")
     finally:
         signal.signal(signal.SIGINT, handler)
-    assert_told(result, 1, "wrote checkpoint_000000.h5", "Aborted!")
+    assert_told(result, 130, "wrote checkpoint_000000.h5", "sph: ended by Ctrl-C")
 
 
 def test_a_stop_while_compiling_and_a_restart_equal_a_run_without(config, tmp_path):
     """Also compiled code is the same whether it was just compiled or comes from the cache."""
     cache = {"NUMBA_CACHE_DIR": str(tmp_path / "cache")}
     process = started(tmp_path, "run", config, "-o", "stopped", **cache)
-    read_until(process.stderr, "preparing")
+    read_until(process.stderr, "compiling the code of this scene")
     process.send_signal(signal.SIGTERM)
     code, _, err = finished(process)
     assert code == 75, err
@@ -437,6 +465,7 @@ def test_a_stop_while_compiling_and_a_restart_equal_a_run_without(config, tmp_pa
     code, out, err = finished(started(tmp_path, "run", config, "-o", "other", **cache))
     assert code == 0, err
     assert "of which 0 s compiling" in out  # else this shows nothing
+    assert "compiling the code" not in err
     found = hashes(tmp_path / "stopped")
     assert len(found) == 5
     assert found == hashes(tmp_path / "other")

@@ -53,6 +53,23 @@ def test_compilation_is_no_part_of_a_phase(clock):
     assert clock.cpu >= clock.compiling + clock.seconds["work"]
 
 
+def test_the_first_compilation_is_told_as_it_begins(clock):
+    told = []
+    clock.on_compilation = lambda: told.append(clock.compiling)
+
+    @njit
+    def one(x):
+        return x + 1.0
+
+    @njit
+    def other(x):
+        return x + 2.0
+
+    one(1.0)
+    other(1.0)
+    assert told == [0.0]
+
+
 def test_a_phase_that_fails_is_counted(clock):
     def fail():
         with clock.phase("work"):

@@ -7,7 +7,7 @@ import pytest
 
 from sph import faults
 from sph.domain import Domain
-from sph.integrators.step_size import StepLimit
+from sph.integrators.step_size import Bounds, StepLimit
 from sph.neighbours.order import BLOCK
 
 
@@ -26,7 +26,10 @@ def state(n=4, dimension=2, boundary="open", external=None, **changed):
     return SimpleNamespace(
         step=4, steps_here=1, time=0.5, totals=totals,
         particles=SimpleNamespace(**arrays | changed),
-        scene=SimpleNamespace(external=external, domain=Domain(box, (boundary,) * dimension)),
+        scene=SimpleNamespace(
+            external=external, domain=Domain(box, (boundary,) * dimension),
+            step_bounds=Bounds(0.1, True, False, 1.0),
+        ),
     )  # fmt: skip
 
 
@@ -36,22 +39,23 @@ def test_a_fault_says_when_what_and_what_to_try():
     assert error.particle == 7
 
 
-@pytest.mark.parametrize(
-    ("criterion", "words"),
-    [
-        ("signal_speed", "signals"),
-        ("energy", "u/|du/dt|"),
-        ("acceleration", "acceleration"),
-        ("support", "support"),
-    ],
-)
-def test_what_sets_a_step_is_its_particle_and_criterion(criterion, words):
-    said = faults.what_sets(StepLimit(0.1, 8, criterion))
-    assert said.startswith("particle 8 sets it by ")
-    assert words in said
-    # no other criterion is told in these words
-    others = {"signals", "u/|du/dt|", "acceleration", "support"} - {words}
-    assert not any(other in said for other in others)
+def test_what_sets_a_step_is_its_particle_and_criterion():
+    words = {
+        "signal_speed": "by the speed of its signals",
+        "energy": "u/|du/dt|",
+        "acceleration": "acceleration",
+        "support": "support",
+        "viscosity": "physics.alpha",
+        "conductivity": "strength of physics.conductivity",
+        "approach": "approach",
+    }
+    assert set(words) == set(faults.SETS)
+    for criterion, expected in words.items():
+        said = faults.what_sets(StepLimit(0.1, 8, criterion))
+        assert said.startswith("particle 8 sets it by ")
+        assert expected in said
+        # no other criterion is told in these words
+        assert sum(expected in faults.what_sets(StepLimit(0.1, 8, one)) for one in words) == 1
     assert "grow" in faults.what_sets(StepLimit(0.1, 0, "growth"))
 
 

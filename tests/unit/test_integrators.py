@@ -165,3 +165,59 @@ def test_of_particles_alike_the_lower_id_sets_the_step(alike, divergence, past, 
 def test_gas_in_which_nothing_moves_takes_one_step():
     limit = step_size.limit(ALL, particles(internal_energy=np.zeros(2)), np.zeros(2), None, None)
     assert limit == (100.0, 0, "end")
+
+
+# --- damping ----------------------------------------------------------------------------------
+
+
+def growth(damping, frequency, dt=1.0):
+    """The largest factor by which a step multiplies an oscillator's state, of the leapfrog itself.
+
+    Its acceleration is -frequency^2 x - damping v, with the velocity that eq 4 predicts.
+    """
+    columns = []
+    for state in np.eye(3):
+        x, v, a = (np.array([[part]]) for part in state)
+        predicted = np.empty((1, 1))
+        leapfrog.predict(dt, x, v, a, predicted)
+        a = -(frequency**2) * x - damping * predicted
+        leapfrog.correct(dt, v, a)
+        columns.append([x[0, 0], v[0, 0], a[0, 0]])
+    return np.abs(np.linalg.eigvals(np.array(columns))).max()
+
+
+@pytest.mark.parametrize("damping", [0.0, 0.05, 0.3, 0.7, 0.95])
+def test_the_leapfrog_is_stable_as_far_as_the_formula_says(damping):
+    """lambda dt + (w dt)^2/4 < 1; eigenvalues of 1 in size are good to the root of rounding."""
+    for inside in (0.01, 0.5, 0.99):
+        assert growth(damping, 2 * np.sqrt(inside * (1 - damping))) < 1 + 1e-7
+    assert growth(damping, 2 * np.sqrt(1.02 * (1 - damping))) > 1.001
+
+
+@pytest.mark.parametrize(
+    ("C", "alpha", "held", "criterion"),
+    [
+        (0.15, 3.0, 0.15, "signal_speed"),  # the seed's own
+        (0.3, 1.0, 0.3, "signal_speed"),
+        (2.0, 0.0, 0.5, "signal_speed"),
+        (0.15, 8.0, 0.0615528, "viscosity"),
+        (2.0, 1.0, 0.3090170, "viscosity"),
+        (2.0, 0.5, 0.3903882, "signal_speed"),  # of sound, more than of viscosity
+    ],
+)
+def test_damping_holds_the_courant_number(C, alpha, held, criterion):
+    bounds = ALL._replace(courant=C, alpha=alpha)
+    assert bounds.held == (pytest.approx(held, rel=1e-6), criterion)
+    if held < C:
+        assert 2 * alpha * bounds.held[0] + 4 * bounds.held[0] ** 2 == pytest.approx(1.0)
+    else:
+        assert bounds.held[0] == C  # to the last bit
+    limit = step_size.limit(bounds, particles(), SIGNALS, None, None)
+    assert limit == (pytest.approx(0.2 * held, rel=1e-6), 8, criterion)
+
+
+def test_strong_conductivity_holds_the_courant_number():
+    strong = ALL._replace(courant=0.15, conductivity=30.0)
+    limit = step_size.limit(strong, particles(), SIGNALS, None, None)
+    assert limit == (pytest.approx(0.2 * 0.05), 8, "conductivity")
+    assert strong._replace(conductivity=10.0).held == (0.15, "signal_speed")

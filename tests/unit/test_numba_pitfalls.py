@@ -18,7 +18,7 @@ from numba import njit
 from numba.core.dispatcher import Dispatcher
 
 import sph
-from sph import registry
+from sph import fingerprint, registry
 from sph.compiled import COMPILED, FASTMATH, FLAGS, larger, smaller, verb
 
 PACKAGE = Path(sph.__file__).parent
@@ -72,12 +72,13 @@ def value(kernel, dim, q):
     return w(kernel, dim, q)
 """
 CALL = """
-import json, caller, numba.core.config as settings
+import json, caller
+from sph.compile_cache import directory
 found = caller.value(caller.make("wendland_c2"), (0, 0), 0.0)
 stats = caller.value.stats
 print(json.dumps({
     "value": found, "hits": stats.cache_hits.total(), "misses": stats.cache_misses.total(),
-    "directory": settings.CACHE_DIR,
+    "directory": str(directory().path),
 }))
 """
 
@@ -147,8 +148,11 @@ def test_code_just_compiled_and_code_from_the_cache_give_the_same_bits(first_ste
 def test_cache_directory_is_the_one_asked_for(tmp_path):
     (tmp_path / "caller.py").write_text(CALLER)
     paths = {"PYTHONPATH": PACKAGE.parent, "NUMBA_CACHE_DIR": tmp_path / "mine"}
-    assert in_new_process(CALL, tmp_path, **paths)["directory"] == str(tmp_path / "mine")
-    assert list((tmp_path / "mine").rglob("*.nbi"))
+    directory = Path(in_new_process(CALL, tmp_path, **paths)["directory"])
+    assert directory.parent == tmp_path / "mine"
+    assert list(directory.glob("caller.value-*.code"))
+    # nothing of Numba's own cache, whose index is not safe against damage
+    assert not list(tmp_path.rglob("*.nb[ci]"))
 
 
 @pytest.mark.skipif(os.name != "posix", reason="the user's cache directory is moved by HOME")
@@ -170,17 +174,19 @@ def test_an_edit_to_a_function_that_is_called_is_seen(tmp_path):
     assert after["directory"] != before["directory"]
 
 
-def test_source_hash_sees_contents_and_names(tmp_path, monkeypatch):
+def test_the_hash_of_the_sources_sees_contents_and_names(tmp_path, monkeypatch):
     monkeypatch.setattr(sph, "__file__", str(tmp_path / "__init__.py"))
     (tmp_path / "part").mkdir()
     one, other = tmp_path / "part" / "one.py", tmp_path / "part" / "other.py"
     hashes = []
     for contents in ("x = 1", "x = 2", "x = 1"):
         one.write_text(contents)
-        hashes.append(sph._source_hash())
+        hashes.append(fingerprint.sources())
     assert hashes[0] == hashes[2] != hashes[1]
     one.rename(other)
-    assert sph._source_hash() not in hashes
+    assert fingerprint.sources() not in hashes
+    other.unlink()
+    assert fingerprint.sources() == ""
 
 
 def test_compiled_functions_share_their_flags_and_are_all_cached():

@@ -13,6 +13,7 @@ from sph import eos, lattice, registry
 from sph.exact import riemann, sedov
 from sph.problems.kelvin_helmholtz import Problem as KelvinHelmholtz
 from sph.problems.kelvin_helmholtz_smooth import Problem as SmoothKelvinHelmholtz
+from sph.problems.noh import Problem as Noh
 from sph.problems.point_explosion import Problem as PointExplosion
 from sph.problems.shock_tube import Problem as ShockTube
 from sph.problems.uniform import Problem as Uniform
@@ -621,3 +622,26 @@ def test_uniform_velocity_has_a_component_for_each_axis():
         Uniform(velocity=[1.0, 2.0, 3.0])
     with pytest.raises(ValidationError, match='take "cubic" or "hexagonal"'):
         Uniform(lattice="bcc")
+
+
+SOUND = np.sqrt(5.0 / 3.0)  # of MONATOMIC gas of density and pressure 1, which expands at 3 c
+
+
+@pytest.mark.parametrize(
+    ("problem", "fills"),
+    [
+        (Uniform(), True),
+        (Uniform(velocity=[9.0 * SOUND, 0.0]), True),  # periodic: the same gas follows
+        (Uniform(boundary="mirror", velocity=[0.0, 2.9 * SOUND]), True),
+        (Uniform(boundary="mirror", velocity=[0.0, 3.1 * SOUND]), False),
+        (Uniform(boundary="mirror", velocity=[-3.1 * SOUND, 0.0]), False),
+        (ShockTube(), True),
+        (ShockTube(left={"density": 1.0, "velocity": -9.0, "pressure": 1.0},
+                   right={"density": 1.0, "velocity": 9.0, "pressure": 1.0}), False),
+        (ShockTube(left={"density": 1.0, "velocity": 9.0, "pressure": 1.0},
+                   right={"density": 1.0, "velocity": 9.0, "pressure": 1.0}), False),
+        (Noh(), False),
+    ],
+)  # fmt: skip
+def test_gas_fills_the_box_unless_it_leaves_vacuum_behind(problem, fills):
+    assert problem.fills_box(MONATOMIC) == fills

@@ -4,12 +4,14 @@ import hashlib
 import json
 import shutil
 
+import numpy as np
 import pytest
 from click.testing import CliRunner
 
 from sph.cli import main
 from sph.output import checkpoint as checkpoints
 from sph.output.run_directory import RunDirectory
+from sph.simulation import Simulation
 
 TUBE = """\
 [problem]
@@ -110,7 +112,9 @@ def test_a_run_killed_before_its_summary_gets_it(run):
 
 def test_only_the_last_checkpoint_stands_for_a_missing_summary(run):
     """Of a run that was taken further, an earlier end is no reason to drop what came later."""
+    ended = run.checkpoint_path(2).read_bytes()
     assert sph_("restart", run.path, "--set", "time.end=0.03").exit_code == 0
+    run.checkpoint_path(2).write_bytes(ended)
     run.summary.unlink()
     before = files(run.path)
     result = sph_("restart", run.checkpoint_path(2))
@@ -162,3 +166,31 @@ def test_a_config_that_is_not_the_checkpoints_is_told(run):
     assert result.exit_code == 0, result.output
     assert "config.toml has physics.alpha = 4.0 (the checkpoint: 3.0)" in result.stderr
     assert checkpoints.read(run.latest()).config.physics.alpha == 3.0
+
+
+SETTINGS = ("--set", "time.end=0.03", "--set", "physics.alpha=2.0", "--set", "physics.C=0.1")
+
+
+@pytest.mark.parametrize("killed_in", ["write_config", "resume", "advance"])
+def test_a_restart_that_is_killed_has_recorded_its_settings(run, tmp_path, monkeypatch, killed_in):
+    """Or none of them: what goes on from there is the whole restart, to the last bit."""
+    whole = RunDirectory(shutil.copytree(run.path, tmp_path / "whole"))
+    assert sph_("restart", whole.path, *SETTINGS).exit_code == 0
+
+    def kill(*_, **__):
+        raise KeyboardInterrupt
+
+    owner = RunDirectory if killed_in == "write_config" else Simulation
+    with monkeypatch.context() as patch:
+        patch.setattr(owner, killed_in, kill)
+        assert sph_("restart", run.path, *SETTINGS).exit_code != 0
+    assert not run.summary.exists()  # which told of the old settings
+    assert sph_("restart", run.path).exit_code == 0
+    one, other = (checkpoints.read(each.latest()) for each in (run, whole))
+    assert one.config == other.config
+    assert one.config.time.end == 0.03
+    assert one.time == 0.03
+    np.testing.assert_array_equal(one.particles.position, other.particles.position)
+    found = json.loads(run.summary.read_text())["settings_changed"]
+    assert found == json.loads(whole.summary.read_text())["settings_changed"]
+    assert "physics.alpha = 2.0 (was 1.0), physics.C = 0.1 (was 0.15) at t = 0.02" in found

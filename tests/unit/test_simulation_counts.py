@@ -61,7 +61,10 @@ def hollow(monkeypatch):
         one = None
         config = configuration.from_text(ALL).override(overrides)
         replace(type(config.problem), "initial", config.problem.initial(Scene(config).eos))
-        replace(simulation.cpu_target.target_context, "refresh")
+        context = SimpleNamespace()
+        monkeypatch.setattr(simulation, "cpu_target", SimpleNamespace(target_context=context))
+        context.refresh = None
+        replace(context, "refresh")
         one = Simulation.of_problem(Scene(config), 1, clock)
         one.asked = []  # the blocks that ask for wider lists, one entry a pass over the density
 
@@ -80,7 +83,8 @@ def hollow(monkeypatch):
         for name, result in (("predict", None), ("predict_energy", 5.0), ("predict_scalar", None),
                              ("correct", None), ("correct_energy", 7.0)):  # fmt: skip
             replace(leapfrog, name, result)
-        replace(step_size, "limit", StepLimit(0.125, 1, "signal_speed"))
+        for name in ("limit", "before_contact"):
+            replace(step_size, name, StepLimit(0.125, 1, "signal_speed"))
         replace(totals, "of", sums)
         replace(Baseline, "at", SimpleNamespace(drift=lambda totals, added: added))
         for owner, name in ((one.watchdog, "check"), (one.watchdog, "check_range"),

@@ -19,7 +19,7 @@ def quiet(**changed):
         "acceleration": np.zeros((2, n)), "energy_rate": np.zeros(n),
     } | changed  # fmt: skip
     config = SimpleNamespace(
-        physics=SimpleNamespace(max_energy_drift=0.02), time=SimpleNamespace(end=0.25)
+        physics=SimpleNamespace(max_energy_drift=0.02, C=0.1), time=SimpleNamespace(end=0.25)
     )
     domain = SimpleNamespace(box=np.array([[0.0, 1.0], [0.0, 2.0]]), boundaries=("mirror", "open"))
     totals = SimpleNamespace(
@@ -27,7 +27,10 @@ def quiet(**changed):
         min_density=1.0, min_internal_energy=1.0, rates=0.0,
     )  # fmt: skip
     return SimpleNamespace(
-        scene=SimpleNamespace(config=config, domain=domain, eos=None, external=None),
+        scene=SimpleNamespace(
+            config=config, domain=domain, eos=None, external=None,
+            step_bounds=step_size.Bounds(0.1, False, False, 0.25),
+        ),
         particles=SimpleNamespace(**arrays), totals=totals, energy_drift=0.0, volume_ratio=None,
         limit=step_size.StepLimit(1e-3, 12, "signal_speed"), time=0.0, step=5,
     )  # fmt: skip

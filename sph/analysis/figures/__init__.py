@@ -9,7 +9,7 @@ from sph.analysis import truth
 from sph.analysis.figures import history, maps, profiles, style
 from sph.analysis.figures.sources import Source, State, find_source, labels
 from sph.errors import ConfigError
-from sph.output.files import explained, replacing
+from sph.output.files import explained, refuse_link, replacing
 from sph.output.history import read as read_history
 
 FORMATS = ("png", "pdf", "svg")
@@ -103,6 +103,7 @@ def _check_format(target: Path) -> None:
 def _save(figure: Figure, path: Path) -> Path:
     """Write `figure`, all or nothing; the directory figures/ is made where it is missing."""
     if path.parent.name == "figures":
+        refuse_link(path.parent)
         with explained(f"cannot write {path}"):
             path.parent.mkdir(exist_ok=True)
     with replacing(path) as unfinished:

@@ -13,6 +13,7 @@ ENERGIES = (
     ("kinetic_energy", "kinetic", style.PALETTE[0], "-."),
 )
 STYLES = ("-", "--", "-.")
+LIMITERS = dict(zip(CRITERIA, (*style.PALETTE, "#999999", "#882255", "black"), strict=True))
 
 
 def figure(
@@ -73,7 +74,7 @@ def _momentum(panel, history, names) -> None:
 
 
 def _steps(panel, history) -> None:
-    for limiter, colour in zip(CRITERIA, style.PALETTE, strict=False):
+    for limiter, colour in LIMITERS.items():
         by = history["limiter"] == limiter
         if not by.any():
             continue

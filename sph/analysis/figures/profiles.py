@@ -125,7 +125,10 @@ def _figure(states, labels, colours, title, note_errors: bool) -> Figure:
     for panel in list(panels.values())[2:]:
         panel.set_xlabel(f"${profiles[0].symbol}$")
     figure.suptitle(title + _without_exact(states))
-    entries = [*zip(drawn, labels, strict=True), *((line, "exact") for line in exact[:1])]
+    entries = [
+        *zip(drawn, labels, strict=True),
+        *((line, states[0].problem.truth[1]) for line in exact[:1]),
+    ]
     figure.legend(
         *zip(*entries, strict=True), loc="outside lower center", markerscale=2.0,
         ncols=7 if max(map(len, labels)) < 15 else 2, columnspacing=1.4, handletextpad=0.4,

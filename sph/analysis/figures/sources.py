@@ -10,7 +10,7 @@ import numpy as np
 from sph.analysis import errors, truth
 from sph.domain import Domain
 from sph.errors import FileError
-from sph.output import checkpoint
+from sph.output import checkpoint, same_run
 from sph.output.run_directory import RunDirectory, find
 
 
@@ -41,12 +41,17 @@ class Source:
     def over_time(self, most: int) -> Iterator["State"]:
         """The first, the last and others evenly between them, at most `most`. Raises FileError.
 
-        They are read one by one, since a large run's do not fit into memory together.
+        They are read one by one, since a large run's do not fit into memory together. One of
+        another problem is an error too.
         """
         count = len(self.checkpoints)
         chosen = np.unique(np.linspace(0, count - 1, min(count, most)).round().astype(int))
+        first = None
         for i in chosen:
-            yield State(checkpoint.read(self.checkpoints[i]))
+            state = State(checkpoint.read(self.checkpoints[i]))
+            first = first or state.problem
+            same_run.check_problem(self.checkpoints[i], state.problem, first)
+            yield state
 
 
 def find_source(path: Path) -> Source:

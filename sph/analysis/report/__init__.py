@@ -6,7 +6,7 @@ from pathlib import Path
 from sph.analysis.report import runs, table, words
 from sph.analysis.report.compare import COSTS, Question, Report, Series, compare
 from sph.errors import ConfigError
-from sph.output.files import explained, write_text
+from sph.output.files import explained, refuse_link, write_text
 
 __all__ = ["COSTS", "Question", "Report", "Series", "in_words", "make", "write"]
 
@@ -45,6 +45,8 @@ def write(report: Report, directory: Path) -> list[Path]:
     """Write table, words and pictures into `directory`; returns the files. Raises FileError."""
     from sph.analysis.figures import report as pictures
 
+    if directory.name == "report":  # its usual place, in a directory that may be a stranger's
+        refuse_link(directory)
     with explained(f"cannot write to {directory}"):
         directory.mkdir(parents=True, exist_ok=True)
     drawn = pictures.draw(report, directory)

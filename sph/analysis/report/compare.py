@@ -31,7 +31,7 @@ class Question(NamedTuple):
 
     @property
     def error_name(self) -> str:
-        return self.field if "." in self.field else f"{self.norm} of {self.field}"
+        return self.field if "." in self.field else f"{self.norm} error of {self.field}"
 
 
 class Series(NamedTuple):

@@ -11,6 +11,7 @@ from typing import Any
 from sph import warnings
 from sph.config.toml_text import value_text
 from sph.errors import FileError
+from sph.output.files import read_text
 from sph.output.run_directory import RunDirectory
 from sph.sweep.manifest import SweepDirectory
 
@@ -161,21 +162,21 @@ def _row(path: Path) -> Row:
     path = path.resolve()
     run = RunDirectory(path)
     try:
-        tables = tomllib.loads(run.config.read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
+        tables = tomllib.loads(read_text(run.config))
+        settings = {
+            f"{table}.{key}": value
+            for table, keys in tables.items()
+            if table != "run"
+            for key, value in keys.items()
+        }
+    except (OSError, ValueError, AttributeError, RecursionError) as error:
         raise FileError(f"{run.config} cannot be read: {error}") from None
-    settings = {
-        f"{table}.{key}": value
-        for table, keys in tables.items()
-        if table != "run"
-        for key, value in keys.items()
-    }
-    if not run.summary.is_file():
+    if not run.summary.exists():
         return Row(path, path.name, settings, {}, "unfinished", "it has not ended")
     try:
-        summary = json.loads(run.summary.read_text(encoding="utf-8"))
+        summary = json.loads(read_text(run.summary))
         return Row(path, path.name, settings, summary, summary["status"], summary["reason"] or "")
-    except (OSError, ValueError, KeyError) as error:
+    except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
         raise FileError(f"{run.summary} cannot be read: {error!r}") from None
 
 

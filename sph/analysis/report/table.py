@@ -28,7 +28,7 @@ def as_markdown(report: Report, sentences: Sequence[str], pictures: Sequence[str
     rows = ["| " + " | ".join(line) + " |" for line in (header, rule, *lines)]
     said = [f"- {sentence}" for sentence in sentences]
     shown = [f"![{name.removesuffix('.png').replace('_', ' ')}]({name})" for name in pictures]
-    title = f"# Error ({report.question.error_name}) against {COSTS[report.question.cost][0]}"
+    title = f"# {report.question.error_name} against {COSTS[report.question.cost][0]}"
     return "\n\n".join([title, "\n".join(rows), "\n".join(said), *shown]) + "\n"
 
 
@@ -124,5 +124,5 @@ def _record(report: Report, row: Row) -> dict:
             table, key = name.split(".")
             record[name] = row.summary[table][key]
         else:
-            record |= {f"{name}.{norm}": row.error(name, norm) for norm in NORMS}
+            record |= {f"{name}_error.{norm}": row.error(name, norm) for norm in NORMS}
     return record

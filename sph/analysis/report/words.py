@@ -29,7 +29,7 @@ def _costs(report: Report) -> str:
     truths = {row.truth for row in report.rows}
     named = truths.pop() if len(truths) == 1 and "." not in question.field else None
     against = f" against the run {Path(named).name}" if named is not None else ""
-    text = f"The error is {question.error_name}{against}, weighed with {COSTS[question.cost][0]}"
+    text = f"Compared: {question.error_name}{against}, weighed with {COSTS[question.cost][0]}"
     if question.cost in ("cpu", "wall"):
         text += f" without compilation and {STARTING.replace('start', 'the start')}"
     return text + "."

@@ -25,6 +25,9 @@ class CullenDehnen(NamedTuple):
     def start(self):
         return self.min
 
+    def largest(self):
+        return self.max
+
     def pair_alpha(self, alpha_i, alpha_j):
         return 0.5 * (alpha_i + alpha_j)
 

@@ -19,6 +19,9 @@ class MorrisMonaghan(NamedTuple):
     def start(self):
         return self.min
 
+    def largest(self):
+        return self.max
+
     def pair_alpha(self, alpha_i, alpha_j):
         return 0.5 * (alpha_i + alpha_j)  # eq 24 prints alpha = 1.0; the pair takes the mean
 

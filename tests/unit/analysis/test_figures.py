@@ -1,5 +1,7 @@
 """Pictures: which are drawn, where they go, and that their axes hold the data they should."""
 
+import shutil
+
 import numpy as np
 import pytest
 from matplotlib.image import imread
@@ -400,3 +402,17 @@ def test_scales():
 )
 def test_numbers(value, text):
     assert style.number(value) == text
+
+
+def test_pictures_are_not_written_through_a_link(tube, tmp_path):
+    (tmp_path / "elsewhere").mkdir()
+    tube.figures.symlink_to(tmp_path / "elsewhere")
+    with pytest.raises(FileError, match="figures is a symbolic link"):
+        figures.draw([tube.path])
+    assert not list((tmp_path / "elsewhere").iterdir())
+
+
+def test_checkpoints_of_two_problems_make_no_evolution(tube, shear):
+    shutil.copy(shear.checkpoint_path(0), tube.checkpoint_path(0))
+    with pytest.raises(FileError, match=r"is not of this run: problem\.name"):
+        list(find_source(tube.path).over_time(6))

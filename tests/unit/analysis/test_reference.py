@@ -147,7 +147,7 @@ def test_the_command_takes_a_reference(tubes, tmp_path):
     assert result.exit_code == 0, result.output
     numbers = [line.split()[0] for line in result.stdout.splitlines()[:3]]
     assert numbers == ["N", "51", "99"]  # without the reference itself
-    assert "The error is L1 of density against the run n=800" in result.stdout
+    assert "Compared: L1 error of density against the run n=800" in result.stdout
 
 
 def test_what_does_not_fit(tubes, tmp_path):
@@ -160,8 +160,8 @@ def test_what_does_not_fit(tubes, tmp_path):
     with pytest.raises(FileError, match="is not a run directory"):
         Reference(tubes)
     (other.path / "checkpoints" / "checkpoint_000000.h5").write_text("damaged")
-    with pytest.raises(FileError, match="is not a checkpoint, or damaged"):
-        Reference(other.path)
+    with pytest.raises(FileError, match="is not an HDF5 file"):
+        Reference(other.path).at(0.0)
 
 
 # --- a reference that the configuration names -------------------------------------------------
@@ -189,7 +189,7 @@ def test_a_run_ends_with_its_errors_against_the_reference(naming, tubes, tmp_pat
     assert found == errors_of(tubes / "n=50", Reference(tubes / "n=800"))  # the same particles
     monkeypatch.chdir(tmp_path)  # the report needs no reference, nor does a restart lose it
     said = sph_("report", "run", "-o", tmp_path / "report").stdout
-    assert "The error is L1 of density against the run n=800" in said
+    assert "Compared: L1 error of density against the run n=800" in said
     restarted = sph_("restart", "run/checkpoints/checkpoint_000000.h5", "-o", "again")
     assert restarted.exit_code == 0, restarted.output
     assert json.loads((tmp_path / "again" / "summary.json").read_text())["errors"] == found
@@ -199,7 +199,7 @@ def test_errors_against_different_truths_are_told_apart(naming, tubes, tmp_path)
     sph_("run", naming, "-o", tmp_path / "run", "--set", "problem.n=60")
     said = sph_("report", tubes / "n=50", tmp_path / "run", "-o", tmp_path / "report").stdout
     assert "Errors are not all against the same" in said
-    assert "The error is L1 of density, weighed" in said
+    assert "Compared: L1 error of density, weighed" in said
 
 
 @pytest.mark.parametrize("dry", [[], ["--dry-run"]])

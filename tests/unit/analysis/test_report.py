@@ -181,7 +181,7 @@ def test_the_order_is_in_the_spacing_also_in_2d(tmp_path):
 
 def test_the_words(study):
     text = said(compared(study))
-    assert "L1 of density, weighed with CPU time without compilation" in text
+    assert "L1 error of density, weighed with CPU time without compilation" in text
     assert "alpha = 1.0: order 1.00 in the particle spacing, so error ∝ cost^-0.50." in text
     assert "On the front: alpha = 1.0 at N = 100, 200, 400." in text
     assert (
@@ -215,7 +215,7 @@ def test_other_questions(study):
     assert by_updates.on_front.all()
     figure = compared(study, field="report.radius_error")
     assert figure.error[1] == pytest.approx(0.5)
-    assert "The error is report.radius_error" in said(figure)
+    assert "Compared: report.radius_error" in said(figure)
     by_number = compared(study, by=("problem.n",))
     assert [line.label for line in by_number.series][:2] == ["n = 100", "n = 200"]
 
@@ -243,8 +243,10 @@ def test_runs_without_an_error_are_listed(study, tmp_path):
     assert len(report.rows) == 6
     text = said(report)
     assert "Without an error: failed (failed: u < 0 of particle 3)." in text
-    assert "Without an error: inexact (it has no L1 of density)." in text
-    assert "Without an error: late (it has no L1 of density: the exact solution ends)." in text
+    assert "Without an error: inexact (it has no L1 error of density)." in text
+    assert (
+        "Without an error: late (it has no L1 error of density: the exact solution ends)." in text
+    )
     assert "Without an error: killed (unfinished: it has not ended)." in text
 
 
@@ -287,8 +289,13 @@ def test_wrong_questions(study, tmp_path):
     (tmp_path / "empty").mkdir()
     with pytest.raises(FileError, match="holds no runs"):
         compared(tmp_path / "empty")
-    (study / "n=100,alpha=1.0" / "summary.json").write_text("{")
-    with pytest.raises(FileError, match=r"summary\.json cannot be read"):
+    point = study / "n=100,alpha=1.0"
+    for text in ("{", "[]", '{"status": "done"}', '{"status": "done", "reason": "", "cost": 1}'):
+        (point / "summary.json").write_text(text)
+        with pytest.raises(FileError, match=r"summary\.json cannot be read"):
+            compared(study)
+    (point / "config.toml").write_text("problem = 1\n")
+    with pytest.raises(FileError, match=r"config\.toml cannot be read"):
         compared(study)
 
 
@@ -395,7 +402,7 @@ def test_a_record_has_all_there_is_of_a_run(tmp_path):
         "run": "a", "status": "done", "reason": "", "problem.n": "100", "particles": 100,
         "steps": 250, "updates": 25_000, "cpu_seconds": 5.0, "wall_seconds": 2.5,
         "compile_cpu_seconds": 10.0, "threads": 2, "warnings": "limit volume",
-        "density.L1": 0.1, "density.L2": 0.2, "density.Linf": pytest.approx(0.3),
+        "density_error.L1": 0.1, "density_error.L2": 0.2, "density_error.Linf": pytest.approx(0.3),
         "report.radius_error": -0.1, "conservation.energy_drift": -1e-5,
         "conservation.energy_drift_max": 2e-5, "conservation.momentum_change": None,
         "error": 0.1, "excess": 1.0, "on_front": True,
@@ -419,6 +426,15 @@ def test_points_that_have_a_run_are_not_listed_a_second_time(tmp_path):
     assert [row.status for row in runs.read([sweep])] == ["done"] * 4
 
 
+def test_a_report_is_not_written_through_a_link(study, tmp_path):
+    (study / "report").symlink_to(tmp_path)
+    before = sorted(tmp_path.iterdir())
+    result = CliRunner().invoke(main, ["report", str(study)])
+    assert result.exit_code == 4
+    assert "report is a symbolic link" in result.stderr
+    assert sorted(tmp_path.iterdir()) == before
+
+
 # --- what is written --------------------------------------------------------------------------
 
 
@@ -427,7 +443,7 @@ def test_the_command_writes_table_words_and_pictures(study):
     assert result.exit_code == 0, result.output
     header, *lines = result.stdout.splitlines()[:7]
     assert re.split(r"  +", header.strip()) == [
-        "physics.alpha", "N", "steps", "CPU s", "L1 of density", "energy drift",
+        "physics.alpha", "N", "steps", "CPU s", "L1 error of density", "energy drift",
         "against the front",
     ]  # fmt: skip
     assert lines[0].split() == ["1.0", "100", "100", "1", "1", "2.0e-05", "front"]
@@ -440,7 +456,7 @@ def test_the_command_writes_table_words_and_pictures(study):
     assert len(records) == 6
     last = records[-1]
     assert (last["physics.alpha"], last["particles"], last["on_front"]) == ("2.0", "400", "False")
-    assert (float(last["density.L2"]), float(last["report.radius_error"])) == (0.5, -0.25)
+    assert (float(last["density_error.L2"]), float(last["report.radius_error"])) == (0.5, -0.25)
     assert float(last["excess"]) == pytest.approx(3.0, rel=ROUND_OFF)
     found = json.loads((study / "report" / "report.json").read_text())
     assert [line["order"] for line in found["series"]] == pytest.approx([1.0, 1.0])

@@ -20,6 +20,7 @@ KEPT = {
     "momentum_change": 3e-15, "volume_ratio": 0.98765, "volume_ratio_worst": 0.5,
 }  # fmt: skip
 ERRORS = {
+    "against": "the exact solution",
     "region": "x > 0",
     "fields": {
         "density": {"L1": 0.01, "relative_L1": 0.025},
@@ -68,6 +69,16 @@ def test_warnings_and_changed_settings_come_before_all_figures(count, words):
     assert found[1 : 1 + count] == [f"Warning: text {i}" for i in range(count)]
     assert found[1 + count].endswith("a = 1; b = 2.")
     assert found[2 + count].startswith("Error")
+
+
+def test_an_error_larger_than_its_field_is_a_multiple_of_it():
+    def told(relative):
+        return lines(errors=ERRORS | {"fields": {"density": {"L1": 1.0, "relative_L1": relative}}})[
+            1
+        ]
+
+    assert told(0.996).endswith("density 1 (1e+02 %).")
+    assert told(1.0).endswith("density 1 (1 times its size).")
 
 
 def test_errors_against_a_run_name_it_and_errors_left_out_say_why():

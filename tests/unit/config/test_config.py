@@ -323,11 +323,11 @@ WRONG = {
     "zero": ("[time]\nend = 0", "line 4: time.end = 0: expected a number greater than 0"),
     "count or word": (
         "[physics]\ndensity_passes = 0",
-        'line 4: physics.density_passes = 0: expected a whole number of at least 1 or "converged"',
+        'line 4: physics.density_passes = 0: expected a whole number from 1 to 100 or "converged"',
     ),
     "wrong word": (
         '[physics]\ndensity_passes = "convergd"',
-        'line 4: physics.density_passes = "convergd": expected a whole number of at least 1 or '
+        'line 4: physics.density_passes = "convergd": expected a whole number from 1 to 100 or '
         '"converged"; did you mean "converged"?',
     ),
     "threads": (

@@ -28,7 +28,8 @@ FREE = ["time.end=0.3", "output.interval=0.1", "report.reference=fine", "run.thr
         "physics.max_energy_drift=0.1"]  # fmt: skip
 RECORDED = ["physics.scheme=variational", "physics.kernel=cubic_spline", "physics.density=number",
             "physics.alpha=2.0", "physics.conductivity=approach", "physics.eta=1.5",
-            "physics.allow_pairing=true", "physics.max_support=2.0", "physics.C=0.1", "physics.balsara=false",
+            "physics.allow_pairing=true", "physics.max_support=2.0", "physics.C=0.1",
+            "physics.balsara=false",
             "physics.density_passes=3", "physics.energy_limit=false"]  # fmt: skip
 REFUSED = ["physics.gamma=1.6", 'physics.eos={ name = "ideal_gas", gamma = 1.6 }',
            'physics.external={ name = "point_mass", mass = 1.0 }', HEATING, RANGE,

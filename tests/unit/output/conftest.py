@@ -10,7 +10,7 @@ from sph.particles import Particles
 DOMAIN = [[-0.5, 0.5], [0.0, 0.25], [-2.0, 2.0]]
 
 
-def configured(dimension: int, boundary: str = "periodic") -> config.Config:
+def configured(dimension: int, boundary: str = "periodic", alpha=None) -> config.Config:
     return config.from_text(
         f"""
         [problem]
@@ -21,6 +21,7 @@ def configured(dimension: int, boundary: str = "periodic") -> config.Config:
         [physics]
         gamma = 1.4
         eta = 1.5
+        alpha = {1.0 if alpha is None else "{ min = 0.1, max = 2.0 }"}
         """,
         "the test",
     )
@@ -38,17 +39,17 @@ def random_state(dimension=2, number=50, boundary="periodic", alpha=None, seed=1
     )
     for name, array in particles.arrays().items():
         if name not in ("id", "position"):
-            array[...] = random.normal(size=array.shape) + 5
+            array[...] = np.abs(random.normal(size=array.shape) + 5)
     particles.id = random.permutation(particles.id)
     return Checkpoint(
         particles=particles,
         time=random.random(),
         step=17,
         next_step=random.random(),
-        list_position=random.random((dimension, number)),
-        list_support=random.random(number),
+        list_position=particles.position.copy(),
+        list_support=0.1 * (0.5 + random.random(number)),  # in a domain of 0.25
         list_skin=0.1,
-        config=configured(dimension, boundary),
+        config=configured(dimension, boundary, alpha),
         lineage=("a first run", "résumé\nof it"),
     )
 

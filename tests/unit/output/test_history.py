@@ -137,3 +137,30 @@ def test_a_row_costs_little(history):
     # measured: 10 microseconds; a step of the smallest runs is of some hundred, and a machine
     # may be three times slower
     assert seconds < 30e-6
+
+
+def test_rows_are_synced_before_a_checkpoint_counts_on_them(history, monkeypatch):
+    synced = []
+    monkeypatch.setattr("sph.output.history.os.fsync", synced.append)
+    append(history, range(3))
+    history.flush()
+    assert synced == [history._descriptor]
+    assert read(history.path)["step"].tolist() == [0, 1, 2]
+
+
+def test_rows_of_a_history_that_was_replaced_go_nowhere(history):
+    append(history, range(2))
+    history.path.rename(history.path.with_name("moved"))
+    history.path.write_text("of another run")
+    with pytest.raises(FileError, match="moved, deleted or replaced"):
+        history.flush()
+    assert history.path.read_text() == "of another run"
+    history._lines.truncate(0)  # for the end of the test, which closes
+
+
+@pytest.mark.parametrize("header", ["step,t", "step,t,t", "t,step"])
+def test_a_header_that_is_cut(tmp_path, header):
+    path = tmp_path / "history.csv"
+    path.write_text(f"{header}\n")
+    with pytest.raises(FileError, match=r"(lacks the columns dt, |is not a history).*\nTry: "):
+        read(path)

@@ -61,6 +61,55 @@ def test_what_failed_before_its_first_checkpoint_is_taken_without_force(finished
     assert tree(finished.path) == {"config.toml"}
 
 
+@pytest.mark.parametrize("rows", [0, 1, 2])
+@pytest.mark.parametrize("has_ended", [False, True])
+def test_what_was_killed_before_its_first_checkpoint_is_taken_without_force(run, rows, has_ended):
+    """Of such a run the history has its first row at most, and there is no summary."""
+    run.history.write_text("step,t\n" + "0,0.0\n" * rows)
+    if has_ended:
+        run.write_summary({})
+    if rows < 2 and not has_ended:
+        RunDirectory.create(run.path)
+        assert tree(run.path) == {"config.toml"}
+    else:
+        with pytest.raises(FileError, match="--force"):
+            RunDirectory.create(run.path)
+
+
+def test_checkpoints_that_are_a_link_are_refused(finished, tmp_path):
+    elsewhere = tmp_path / "elsewhere"
+    (finished.path / "checkpoints").rename(elsewhere)
+    (finished.path / "checkpoints").symlink_to(elsewhere)
+    before = tree(elsewhere)
+    for refused in (RunDirectory.open, RunDirectory.create, lambda p: RunDirectory.create(p, True)):
+        with pytest.raises(FileError, match=r"checkpoints is a symbolic link.*\nTry: "):
+            refused(finished.path)
+    with pytest.raises(FileError), finished.alone():
+        pass
+    assert tree(elsewhere) == before
+
+
+@pytest.mark.parametrize("name", ["config.toml", "summary.json"])
+def test_a_pipe_in_a_received_directory_is_not_waited_for(finished, name):
+    (finished.path / name).unlink()
+    os.mkfifo(finished.path / name)
+    assert find(finished.path)[1] == finished.checkpoint_path(2)
+
+
+def test_a_run_does_not_write_to_a_directory_that_has_taken_the_place_of_its_own(
+    run, make_state, tmp_path
+):
+    path = run.checkpoint_path(0)
+    with run.alone():
+        run.path.rename(tmp_path / "moved")
+        other = RunDirectory.create(run.path)
+        with pytest.raises(FileError, match="moved, deleted or replaced"):
+            checkpoint.write(path, make_state())
+        with pytest.raises(FileError, match="moved, deleted or replaced"):
+            run.write_summary({})
+    assert tree(other.path) == set()
+
+
 def test_where_the_file_system_has_no_locks_runs_go_on_without(run, monkeypatch):
     def refuse(*_):
         raise OSError(errno.ENOLCK, "No locks available")

@@ -26,7 +26,7 @@ TUBE = """\
 name = "shock_tube"
 n = 40
 [physics]
-max_energy_drift = 0.002
+max_energy_drift = 0.0002
 [time]
 end = 0.06
 [output]

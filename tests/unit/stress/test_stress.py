@@ -12,8 +12,9 @@ from sph import config as configuration
 from sph.cli import main
 from sph.errors import ConfigError, FileError
 from sph.stress import case as cases
-from sph.stress import figures
+from sph.stress import command, figures
 from sph.stress.case import Bound
+from sph.sweep.task import Outcome
 
 # Gas at rest on a lattice, where nothing happens, so that each figure is known beforehand.
 STILL = """\
@@ -213,3 +214,14 @@ def test_cases_are_in_the_package():
 def test_an_unknown_case_is_an_error():
     with pytest.raises(ConfigError, match="there is no case"):
         cases.load(["no_such_case"])
+
+
+def test_a_run_that_cannot_write_is_no_verdict_on_its_method(tmp_path, monkeypatch):
+    monkeypatch.setattr(cases, "FOLDER", tmp_path)
+    (tmp_path / "still.toml").write_text(STILL)
+    refused = Outcome("still.right", "failed", "cannot write x: No space left on device.", "run", 4)
+    monkeypatch.setattr(command.local, "run", lambda tasks, jobs, tell: tell(refused))
+    result = CliRunner().invoke(main, ["stress", "-o", str(tmp_path / "out")])
+    assert result.exit_code == 4
+    assert "still.right: cannot write x: No space left" in result.stderr
+    assert not (tmp_path / "out" / "stress.json").exists()

@@ -60,15 +60,15 @@ def test_the_same_sweep_by_dask_gives_the_same_numbers(killed, cluster, program,
 
 def test_a_scheduler_of_its_own(address, program, tmp_path):
     path = tmp_path / "sweep"
-    arguments = ("--vary", "physics.C=0.15,50.0", "--set", "problem.left.pressure=1e3",
-                 "--set", "time.end=0.002", "--scheduler", address, "-o", path)  # fmt: skip
+    arguments = ("--vary", "physics.max_energy_drift=0.02,1e-15", "--set", "time.end=0.002",
+                 "--scheduler", address, "-o", path)  # fmt: skip
     result = program.run(*arguments)
     assert result.exit_code == 3, result.output
-    assert "1 of 2 points are done, 1 failed:\n  physics.C=50.0: " in result.stderr
+    assert "1 of 2 points are done, 1 failed:\n  physics.max_energy_drift=1e-15: " in result.stderr
     result = program.run(*arguments)
     assert result.exit_code == 3
-    assert attempts(path, "physics.C=0.15") == ["run"]
-    assert attempts(path, "physics.C=50.0") == ["run", "run"]
+    assert attempts(path, "physics.max_energy_drift=0.02") == ["run"]
+    assert attempts(path, "physics.max_energy_drift=1e-15") == ["run", "run"]
 
 
 def test_a_stop_reaches_the_workers(cluster, program, tmp_path):

@@ -13,6 +13,7 @@ import pytest
 from conftest import attempts, runs, until
 
 from sph.output.history import read as read_history
+from sph.sweep import command
 from sph.sweep.local import available_processors
 from sph.sweep.manifest import SweepDirectory
 from sph.sweep.plan import Plan
@@ -67,29 +68,28 @@ def test_a_sweep_that_is_done_does_nothing(killed):
 
 
 def test_a_failed_point_is_told_and_the_rest_go_on(program, tmp_path):
-    arguments = ("--vary", "physics.eta=1.6,5e4", "--vary", "physics.C=0.15,50.0",
-                 "--set", "problem.left.pressure=1e3", "--set", "time.end=0.002",
-                 "-o", tmp_path / "sweep")  # fmt: skip
+    arguments = ("--vary", "physics.eta=1.6,5e4", "--vary", "physics.max_energy_drift=0.02,1e-15",
+                 "--set", "time.end=0.002", "-o", tmp_path / "sweep")  # fmt: skip
     result = program.run(*arguments)
     assert result.exit_code == 3, result.output
     assert "1 of 4 points are done, 3 failed" in result.stderr
     # one failed in its steps, and two before there was a run directory to tell of it
     assert "times the shortest side of the box" in result.stderr
     found = runs(tmp_path / "sweep")
-    assert found["physics.eta=1.6,physics.C=0.15"].summary.exists()
-    failed = found["physics.eta=1.6,physics.C=50.0"]
+    assert found["physics.eta=1.6,physics.max_energy_drift=0.02"].summary.exists()
+    failed = found["physics.eta=1.6,physics.max_energy_drift=1e-15"]
     assert json.loads(failed.summary.read_text())["status"] == "failed"
     reasons = SweepDirectory(tmp_path / "sweep").failures()
     assert sorted(reasons) == [
-        "physics.eta=1.6,physics.C=50.0",
-        "physics.eta=5e4,physics.C=0.15",
-        "physics.eta=5e4,physics.C=50.0",
+        "physics.eta=1.6,physics.max_energy_drift=1e-15",
+        "physics.eta=5e4,physics.max_energy_drift=0.02",
+        "physics.eta=5e4,physics.max_energy_drift=1e-15",
     ]
     assert json.loads(failed.summary.read_text())["reason"].strip() == reasons[failed.path.name]
     result = program.run(*arguments)
     assert result.exit_code == 3
     assert "1 of 4 points are done already" in result.stderr
-    assert attempts(tmp_path / "sweep", "physics.eta=1.6,physics.C=0.15") == ["run"]
+    assert attempts(tmp_path / "sweep", "physics.eta=1.6,physics.max_energy_drift=0.02") == ["run"]
     assert attempts(tmp_path / "sweep", failed.path.name) == ["run", "run"]
 
 
@@ -128,8 +128,8 @@ def test_a_second_interrupt_ends_the_runs_at_once(program, tmp_path):
     until(lambda: "again to stop at once" in log.read_text())
     process.send_signal(signal.SIGINT)
     _, told = process.communicate(timeout=60)
-    assert process.returncode == 1
-    assert "Aborted!" in told
+    assert process.returncode == 130
+    assert "sph: ended by Ctrl-C" in told
     assert not list(path.glob("*/checkpoints/*.h5"))
 
 
@@ -197,3 +197,34 @@ def test_the_last_lines_of_a_run_without_a_message_are_the_reason(program, monke
 
 def test_processors():
     assert 1 <= available_processors() <= os.cpu_count()
+
+
+def test_a_sweep_says_how_many_points_it_has_and_above_a_bound_asks(program, tmp_path, monkeypatch):
+    ran = []
+    monkeypatch.setattr(command.local, "run", lambda tasks, jobs, tell: ran.append(len(tasks)))
+    monkeypatch.setattr(command, "ASKED_ABOVE", 2)
+    arguments = ("--vary", "problem.n=40,50,60", "-o", tmp_path / "sweep")
+    result = program.run(*arguments)
+    assert result.exit_code == 2
+    assert "these are 3 points" in result.stderr
+    assert "--yes" in result.stderr
+    assert not (tmp_path / "sweep").exists()
+    result = program.run(*arguments, "--yes")
+    assert result.exit_code == 0
+    assert "3 points to check and run" in result.stderr
+    assert ran == [3]
+
+
+def test_what_the_file_system_refuses_for_a_point_is_its_reason(program, tmp_path):
+    path = tmp_path / "a path/sweep"
+    (path.parent).mkdir()
+    result = program.run("--vary", "problem.n=40", "-o", path)
+    assert f"(`sph report '{path}'` compares them)" in result.stdout
+    for part in ("checkpoints", "summary.json"):
+        target = path / "problem.n=40" / part
+        target.rename(target.with_name(f"old-{part}"))
+    (path / "problem.n=40" / "checkpoints").touch()
+    result = program.run("--vary", "problem.n=40", "-o", path)
+    assert result.exit_code in (3, 4), result.output
+    assert "Not a directory" in result.stderr
+    assert isinstance(result.exception, SystemExit)

@@ -1,5 +1,6 @@
 """The directory of a sweep: made once, extended, and refused where it is of something else."""
 
+import h5py
 import pytest
 
 from sph import config as configuration
@@ -7,6 +8,7 @@ from sph.errors import ConfigError, FileError
 from sph.output.run_directory import RunDirectory
 from sph.sweep.manifest import SweepDirectory
 from sph.sweep.plan import Plan
+from sph.sweep.task import execute, standing, tasks
 
 TUBE = '[problem]\nname = "shock_tube"\nn = 40\n'
 
@@ -102,9 +104,81 @@ def test_a_wrong_point_makes_no_directory(config, sweep):
     assert not sweep.path.exists()
 
 
-@pytest.mark.parametrize("text", ["", "points = 1", "[["])
+@pytest.mark.parametrize("text", [
+    "", "points = 1", "[[", 'set = "x"\n[vary]\n[points]', "set = []\n[vary]\nx = 1\n[points]",
+    "set = []\n[vary]\n[points]\na = [1]", "a = " + "[" * 5000,
+])  # fmt: skip
 def test_what_is_no_manifest(text, config, sweep):
     sweep.prepare(config, of("problem.n=50"))
     sweep.manifest.write_text(text)
     with pytest.raises(FileError, match="is not the manifest of a sweep"):
         sweep.prepare(config, of("problem.n=50"))
+
+
+def test_a_reason_that_is_not_text_is_told_as_far_as_it_is(config, sweep):
+    plan = of("problem.n=50,60,70,80")
+    sweep.prepare(config, plan)
+    names = [point.name for point in plan.points]
+    (sweep.logs / f"{names[0]}.failed").write_bytes(b"no\xff text\n")
+    (sweep.logs / f"{names[1]}.failed").touch()
+    (sweep.logs / f"{names[2]}.failed").mkdir()
+    found = sweep.failures()
+    assert found[names[0]] == "no\ufffd text"
+    assert found[names[1]] == "no reason was kept"
+    assert found[names[2]] == "the reason cannot be read: Is a directory"
+    standings = [standing(task) for task in tasks(sweep, plan)]
+    assert [one.status for one in standings] == ["failed", "failed", "stopped", "stopped"]
+    assert standings[0].reason == found[names[0]]
+
+
+@pytest.mark.parametrize("has_base", [False, True])
+def test_a_sweep_killed_while_preparing_is_taken_over(config, sweep, has_base):
+    sweep.logs.mkdir(parents=True)
+    (sweep.path / ".base.toml.0123.partial").touch()
+    if has_base:
+        sweep.base.write_text(TUBE)
+    sweep.prepare(config, of("problem.n=40,50"))
+    assert sweep.plan() == of("problem.n=40,50")
+
+
+@pytest.mark.parametrize("there", ["logs/notes.txt", "notes.txt", "base.toml"])
+def test_what_is_more_than_a_killed_sweep_leaves_is_refused(config, sweep, there):
+    sweep.logs.mkdir(parents=True)
+    (sweep.path / there).write_text("[problem]\n")
+    before = files(sweep.path)
+    with pytest.raises(FileError, match="not the directory of a sweep"):
+        sweep.prepare(config, of("problem.n=40,50"))
+    assert files(sweep.path) == before
+
+
+def test_logs_that_are_a_link_are_refused(config, sweep, tmp_path):
+    sweep.prepare(config, of("problem.n=40,50"))
+    sweep.logs.rename(tmp_path / "elsewhere")
+    sweep.logs.symlink_to(tmp_path / "elsewhere")
+    with pytest.raises(FileError, match="logs is a symbolic link"):
+        sweep.prepare(config, of("problem.n=40,50"))
+
+
+def test_a_log_that_is_a_link_is_not_written_through(config, sweep, tmp_path):
+    sweep.prepare(config, of("problem.n=40"))
+    (tmp_path / "mine").write_text("precious")
+    (task,) = tasks(sweep, sweep.plan())
+    task.log.symlink_to(tmp_path / "mine")
+    outcome = execute(task)
+    assert (outcome.status, outcome.code) == ("failed", 4)
+    assert (tmp_path / "mine").read_text() == "precious"
+
+
+def test_a_point_whose_checkpoint_cannot_be_judged_is_not_run_anew(config, sweep):
+    """It would replace what a newer version may have written."""
+    sweep.prepare(config, of("problem.n=40"))
+    (task,) = tasks(sweep, sweep.plan())
+    run = RunDirectory.create(task.run.path)
+    run.write_config(configuration.load(config).to_toml())
+    with h5py.File(run.checkpoint_path(0), "w") as file:
+        file.create_group("Checkpoint").attrs["format_version"] = 1000
+    outcome = execute(task)
+    assert (outcome.status, outcome.code) == ("failed", 4)
+    assert "a newer format" in outcome.reason
+    run.checkpoint_path(0).write_bytes(b"damaged")
+    assert "--force" in task.command()

@@ -44,6 +44,13 @@ def test_values_are_split_at_commas_outside_of_brackets_and_quotes(text, parts):
         ("1e-6:1e-2:x100", ["1e-06", "0.0001", "0.01"]),
         ("wendland_c2", ["wendland_c2"]),
         ("a:b:c", ["a:b:c"]),
+        ("1e-300:1e300:x1e200", ["1e-300", "1e-100", "1e+100", "1e+300"]),  # the ratio overflows
+        (
+            "123456789012345:123456789012347:+1",
+            ["123456789012345", "123456789012346", "123456789012347"],
+        ),  # all digits are kept
+        ("1:2:xnan", ["1:2:xnan"]),
+        ("\u0661:\u0663:+\u0661", ["\u0661:\u0663:+\u0661"]),  # digits, but not TOML's
     ],
 )
 def test_ranges_include_their_last_value_within_rounding(text, values):
@@ -52,8 +59,10 @@ def test_ranges_include_their_last_value_within_rounding(text, values):
 
 @pytest.mark.parametrize(
     "text",
-    ["100:1600:x1", "0:10:x2", "100:1600:x0.5", "1:2:+0", "1:2:-0.5", "0:1:+1e-9", "1:2:x2a"],
-)
+    ["100:1600:x1", "0:10:x2", "100:1600:x0.5", "1:2:+0", "1:2:-0.5", "0:1:+1e-9", "1:2:x2a",
+     "1e400:1e400:x2", "1:1e400:+1", "1:2:+1e400", "1e-400:1:x10", "1:1e12:+1", "1:2:x1.0000001",
+     "1:2:x1.00000000000000000001", "1:" + "9" * 400 + ":x10", "1:10001:+1"],
+)  # fmt: skip
 def test_ranges_that_lead_nowhere(text):
     with pytest.raises(ConfigError, match=re.escape(text)):
         expand(text)
@@ -94,6 +103,9 @@ def test_names_are_safe_short_and_different():
         (["problem.n=1,2,1"], "1 stands there twice"),
         (["problem.n=100:400:x2,200"], "200 stands there twice"),
         (["problem.n=1", "problem.n=2"], "problem.n is varied already"),
+        (["problem.n=1", "problem . n=2"], "problem.n is varied already"),
+        (["problem.n=1:9000:+1", "physics.C=1:9000:+1"], "81,000,000 points"),
+        (["problem. =1"], "expected TABLE.KEY=VALUE"),
     ],
 )
 def test_what_cannot_be_varied(varies, words):
@@ -125,3 +137,21 @@ def test_what_is_wrong_only_together_names_the_point(tmp_path):
     plan = Plan.of(["problem.dimension=1,2", "problem.lattice=cubic,hexagonal"])
     with pytest.raises(ConfigError, match=r"dimension=1,problem\.lattice=hexagonal|--vary"):
         plan.resolved(tmp_path / "tube.toml")
+
+
+@pytest.mark.parametrize("override", ["physics.alpha=1.0", "physics . alpha.min=0.1"])
+def test_a_key_that_is_set_too_is_refused(override):
+    with pytest.raises(ConfigError, match=r"physics\.alpha is varied"):
+        Plan.of(["physics.alpha=0.5,1.0"], [override])
+
+
+def test_two_points_of_one_configuration_are_refused(tmp_path):
+    (tmp_path / "tube.toml").write_text(TUBE)
+    with pytest.raises(ConfigError, match=r"alpha=0\.5 and physics\.alpha=0\.50 are the same"):
+        Plan.of(["physics.alpha=0.5,0.50"]).resolved(tmp_path / "tube.toml")
+
+
+def test_text_that_is_not_utf8_is_refused(tmp_path):
+    (tmp_path / "tube.toml").write_text(TUBE)
+    with pytest.raises(ConfigError, match="expected UTF-8 text"):
+        Plan.of(["physics.kernel=wendland_c2,\udcff"]).resolved(tmp_path / "tube.toml")

@@ -1,0 +1,168 @@
+"""Particles that are no neighbours yet and would meet within a step, found before it is taken.
+
+Eq 32 bounds a step by the approach of neighbours. Cold gas that is still apart has none across the
+gap: it could overlap by whole supports before a pair acts, or be pushed for all of a long step by
+the force that only its end has found. A pair, images included, bounds the step here where its
+straight paths shorten its distance by more than FAR of the smaller support, from outside both
+supports to within the larger. The step then ends at the rim of the support; from close to the rim,
+where eq 32 would let neighbours come in a step. Node pairs of the block tree are dropped where they
+move too little against each other or stay apart: in smooth flow that is the root already.
+"""
+
+import numpy as np
+from numba import njit
+
+from sph.compiled import COMPILED, larger, smaller
+from sph.neighbours import tree
+from sph.neighbours.order import BLOCK
+
+FAR = 0.5
+
+SLACK = 1e-9
+
+# Node pairs that wait while one is looked at: each level of the tree leaves two at most, of 27
+# images at the root.
+STACK = 27 + 4 * 64
+
+
+@njit(**COMPILED)
+def first_contact(
+    position, velocity, acceleration, support, identity, images, box_length, dt, reached
+):
+    """(part of dt, particle): where the step must end for the first such pair, and whose it is.
+
+    `reached`: how deep, in parts of the smaller support, a pair may come from close to the rim.
+    Position, velocity, acceleration (D, N) and support, identity (N,) in block order; images of the
+    domain, which serve distances up to box_length: a step in which particles move farther against
+    each other is cut to that, for particle 0. (1, 0) where there is no such pair.
+    """
+    whole = _served(velocity, acceleration, support, images, box_length, dt)
+    if not whole > 0.0:
+        return 1.0, 0
+    dt = whole * dt
+    moves = dt * (velocity + 0.5 * dt * acceleration)
+    part, particle = _walk(position, moves, support, identity, images, min(reached, FAR))
+    return whole * part, particle
+
+
+@njit(**COMPILED, forceinline=True)
+def _served(velocity, acceleration, support, images, box_length, dt):
+    """The part of dt that images serve; 0 where no pair moves far, which is nearly always."""
+    D, n = velocity.shape
+    least = np.inf
+    for i in range(n):
+        least = smaller(least, support[i])
+    squared = 0.0
+    for d in range(D):
+        low, high = np.inf, -np.inf
+        for i in range(n):
+            move = dt * (velocity[d, i] + 0.5 * dt * acceleration[d, i])
+            low, high = smaller(low, move), larger(high, move)
+        apart = high - low
+        if images.sign[:, d].min() < 0.0:  # at a wall moves meet their own images
+            apart = max(apart, 2.0 * high, -2.0 * low)
+        squared += apart * apart
+    apart = np.sqrt(squared)
+    if not (FAR * least < apart < np.inf):
+        return 0.0
+    return min(1.0, box_length / apart)
+
+
+@njit(**COMPILED, forceinline=True)
+def _walk(position, moves, support, identity, images, reached):
+    """The first contact of `first_contact`, as a part of the step that `moves` (D, N) are of."""
+    n = support.size
+    boxes = tree.build(position, support)
+    motion = tree.build(moves, -support)  # whose largest -H is the smallest H
+    first, last = boxes.first, boxes.last
+    best, particle = 1.0, 0
+    stack = np.empty((STACK, 3), np.int64)
+    depth = 0
+    for image in range(images.sign.shape[0] - 1, -1, -1):
+        stack[depth] = 0, 0, image
+        depth += 1
+    while depth > 0:
+        depth -= 1
+        a, b, image = stack[depth]
+        if not _earliest(boxes, motion, images, a, b, image, best) <= best:
+            continue
+        many_a, many_b = last[a] - first[a], last[b] - first[b]
+        if many_a == 1 and many_b == 1:
+            for i in range(first[a] * BLOCK, min(last[a] * BLOCK, n)):
+                begin = first[b] * BLOCK
+                if image == 0 and a == b:  # each pair once, and no particle with itself
+                    begin = i + 1
+                for j in range(begin, min(last[b] * BLOCK, n)):
+                    part = _contact(position, moves, support, images, i, j, image, reached)
+                    lower = min(identity[i], identity[j])
+                    if part < best or (part == best and lower < particle):
+                        best, particle = part, lower
+            continue
+        if image == 0 and a == b:
+            stack[depth] = 2 * a + 1, 2 * a + 2, 0
+            stack[depth + 1] = 2 * a + 2, 2 * a + 2, 0
+            stack[depth + 2] = 2 * a + 1, 2 * a + 1, 0
+            depth += 3
+            continue
+        near, far = (2 * a + 1, b), (2 * a + 2, b)
+        if many_b > many_a:
+            near, far = (a, 2 * b + 1), (a, 2 * b + 2)
+        # the pair that may meet first is looked at first: what it finds drops others
+        if _earliest(boxes, motion, images, far[0], far[1], image, best) < _earliest(
+            boxes, motion, images, near[0], near[1], image, best
+        ):
+            near, far = far, near
+        stack[depth] = far[0], far[1], image
+        stack[depth + 1] = near[0], near[1], image
+        depth += 2
+    return best, particle
+
+
+@njit(**COMPILED)
+def _earliest(boxes, motion, images, a, b, image, best):
+    """A part of the step before which no pair of two nodes makes contact; inf if none by `best`.
+
+    SLACK makes up for rounding: what is dropped here must not depend on how this was compiled.
+    """
+    least = -max(motion.support[a], motion.support[b])
+    reach = (1.0 + SLACK) * max(boxes.support[a], boxes.support[b])
+    apart = travel = missed = 0.0
+    for d in range(boxes.lower.shape[1]):
+        s, o = images.sign[image, d], images.offset[image, d]
+        flip = s < 0.0
+        x_low = s * (boxes.upper[b, d] if flip else boxes.lower[b, d]) + o
+        x_high = s * (boxes.lower[b, d] if flip else boxes.upper[b, d]) + o
+        m_low = s * (motion.upper[b, d] if flip else motion.lower[b, d])
+        m_high = s * (motion.lower[b, d] if flip else motion.upper[b, d])
+        low, high = boxes.lower[a, d] - x_high, boxes.upper[a, d] - x_low
+        back, forth = motion.lower[a, d] - m_high, motion.upper[a, d] - m_low
+        apart += max(0.0, low, -high) ** 2
+        travel += max(-back, forth) ** 2
+        missed += max(0.0, low + min(0.0, best * back), -high - max(0.0, best * forth)) ** 2
+    if not travel > ((1.0 - SLACK) * FAR * least) ** 2 or missed > reach * reach:
+        return np.inf
+    return max(0.0, np.sqrt(apart) - reach) / np.sqrt(travel)
+
+
+@njit(**COMPILED, forceinline=True)
+def _contact(position, moves, support, images, i, j, image, reached):
+    """Where the step must end for i and that image of j, as a part of it; inf if they may meet."""
+    squared = along = travel = 0.0
+    for d in range(position.shape[0]):
+        s = images.sign[image, d]
+        r = position[d, i] - (s * position[d, j] + images.offset[image, d])
+        move = moves[d, i] - s * moves[d, j]
+        squared += r * r
+        along += r * move
+        travel += move * move
+    H, least = max(support[i], support[j]), min(support[i], support[j])
+    if squared < H * H or not along < 0.0:  # neighbours already, or parting
+        return np.inf
+    nearest = min(1.0, -along / travel)
+    closest = squared + nearest * (2.0 * along + nearest * travel)
+    apart = np.sqrt(squared)
+    if not closest < H * H or apart - np.sqrt(max(0.0, closest)) < FAR * least:
+        return np.inf
+    end = H if apart > H + reached * least else H - reached * least
+    outside = squared - end * end
+    return outside / (np.sqrt(max(0.0, along * along - travel * outside)) - along)

@@ -1,0 +1,78 @@
+"""Whether the files in a run directory are of one run: nothing of another run may be replaced."""
+
+import itertools
+from pathlib import Path
+
+import numpy as np
+
+from sph import config as configuration
+from sph.errors import ConfigError, FileError
+from sph.output import history
+from sph.output.checkpoint import Checkpoint
+from sph.output.files import read_text
+
+REMEDY = f"Try: move what is not of this run out of the directory; or {history.ALONE}"
+
+
+def check_configuration(path: Path, checkpoint: Checkpoint) -> None:
+    """Raise FileError where config.toml, if it can be read, is of another problem."""
+    try:
+        there = configuration.from_text(read_text(path), str(path))
+    except (ConfigError, FileError, OSError, UnicodeDecodeError):
+        return  # missing or of another version: the checkpoint tells what it needs
+    check_problem(path, there.problem, checkpoint.config.problem)
+
+
+def check_problem(path: Path, problem, of_the_run) -> None:
+    """Raise FileError where the problem in `path` is another than that of the run."""
+    if problem != of_the_run:
+        keys = problem.model_dump() | of_the_run.model_dump()
+        other = [
+            key for key in keys if getattr(problem, key, None) != getattr(of_the_run, key, None)
+        ]
+        raise _other(path, f"problem.{', problem.'.join(other)} differ from its other files")
+
+
+def check_history(path: Path, checkpoint: Checkpoint) -> None:
+    """Raise FileError where the history does not lead to that state."""
+    p, config = checkpoint.particles, checkpoint.config
+    with np.errstate(all="ignore"):
+        sums = {
+            "t": checkpoint.time,
+            "kinetic_energy": float(0.5 * np.sum(p.mass * p.velocity**2)),
+            "internal_energy": float(p.mass @ p.internal_energy),
+        }
+        diagnostics = list(config.problem.diagnostics(p))
+    history.check(path, p.dimension, diagnostics, checkpoint.step, sums)
+
+
+def check_order(earlier: Path, later: Path, before: Checkpoint, after: Checkpoint) -> None:
+    """Raise FileError where two checkpoints, next to each other by number, are not of one run."""
+    check_problem(later, after.config.problem, before.config.problem)
+    if not np.array_equal(np.sort(before.particles.id), np.sort(after.particles.id)):
+        raise _other(later, f"its particles are not those of {earlier.name}")
+    if after.step <= before.step or after.time <= before.time:
+        raise _other(
+            later,
+            f"step {after.step}, t = {after.time!r} do not come after step {before.step}, "
+            f"t = {before.time!r} of {earlier.name}",
+        )
+    if after.lineage[: len(before.lineage)] != before.lineage:
+        raise _other(later, f"its lineage does not continue that of {earlier.name}")
+    if after.lineage == before.lineage and after.config.to_toml(False) != before.config.to_toml(
+        False
+    ):
+        raise _other(
+            later, f"its configuration is not that of {earlier.name}: {_key(before, after)}"
+        )
+
+
+def _key(before: Checkpoint, after: Checkpoint) -> str:
+    """The first key that differs, with both values."""
+    tables = [one.config.to_toml(False).splitlines() for one in (before, after)]
+    pairs = itertools.zip_longest(*tables, fillvalue="nothing")
+    return next(f"{there} and {here}" for there, here in pairs if there != here)
+
+
+def _other(path: Path, why: str) -> FileError:
+    return FileError(f"{path} is not of this run: {why}.\n{REMEDY}")

@@ -1,0 +1,80 @@
+"""Whether the numbers of a checkpoint are those of a state that a run can have.
+
+What compiled code takes on trust is checked here: lengths, order of magnitude, IDs, places.
+"""
+
+import numpy as np
+
+from sph.neighbours.lists import MAX_PARTICLES
+
+POSITIVE = ("mass", "support", "density", "list_support")
+AT_LEAST_ZERO = ("internal_energy", "alpha")
+# Far above the skin of any run (sph.neighbours.search.best_skin), which is below 1.
+MOST_SKIN = 10.0
+MOST_STEPS = 2**53  # beyond which the history, of float64, cannot count
+
+
+def faults_of_shape(checkpoint) -> list[str]:
+    """What is wrong with the shapes and IDs of a checkpoint, in words."""
+    particles, config = checkpoint.particles, checkpoint.config
+    n, D = particles.id.size, config.problem.dimension
+    if not 1 <= n <= MAX_PARTICLES:
+        return [f"it has {n} particles, expected 1 to {MAX_PARTICLES}"]
+    found = []
+    # alpha_rate and pressure are made where a restart has changed the scene, and left out
+    evolves = config.physics.viscosity_model().evolves
+    if evolves != (particles.alpha is not None):
+        there = "missing" if evolves else "there"
+        found.append(f"alpha is {there}, which its configuration does not fit")
+    for name, array in _arrays(checkpoint).items():
+        expected = (n,) if array.ndim == 1 else (D, n)
+        if array.shape != expected:
+            found.append(f"{name} has the shape {array.shape}, expected {expected}")
+    ids = np.sort(particles.id)
+    if ids[0] < 1 or np.any(ids[1:] == ids[:-1]):
+        found.append("its particle IDs are not all different and above 0")
+    return found
+
+
+def faults_of_value(checkpoint) -> list[str]:
+    """What is wrong with the numbers of a checkpoint whose shapes are right, in words."""
+    found = [f"{name} = {value}" for name, value in _bad_scalars(checkpoint)]
+    for name, array in _arrays(checkpoint).items():
+        if not np.all(np.isfinite(array)):
+            found.append(f"{name} is not finite everywhere")
+        elif name in POSITIVE and not array.min() > 0.0:
+            found.append(f"{name} is not above 0 everywhere")
+        elif name in AT_LEAST_ZERO and array.min() < 0.0:
+            found.append(f"{name} is below 0 somewhere")
+    return found or _faults_of_place(checkpoint)
+
+
+def _bad_scalars(checkpoint):
+    c = checkpoint
+    good = {
+        "time": np.isfinite(c.time) and c.time >= 0.0,
+        "step": 0 <= c.step <= MOST_STEPS,
+        "next_step": np.isfinite(c.next_step) and c.next_step > 0.0,
+        "list_skin": 0.0 <= c.list_skin <= MOST_SKIN,
+    }
+    return [(name, getattr(c, name)) for name, fine in good.items() if not fine]
+
+
+def _faults_of_place(checkpoint) -> list[str]:
+    """Particles outside a closed axis: lists are built of those inside, which may then move."""
+    problem, found = checkpoint.config.problem, []
+    moves = (1.0 + checkpoint.list_skin) * checkpoint.list_support
+    places = {"list_position": 0.0, "position": moves}
+    for axis, (low, high) in enumerate(problem.box):
+        if problem.boundaries[axis] == "open":
+            continue
+        for name, room in places.items():
+            x = _arrays(checkpoint)[name][axis]
+            if np.any((x < low - room) | (x > high + room)):
+                found.append(f"{name} is outside the domain along {'xyz'[axis]}")
+    return found
+
+
+def _arrays(checkpoint) -> dict[str, np.ndarray]:
+    lists = {name: getattr(checkpoint, name) for name in ("list_position", "list_support")}
+    return checkpoint.particles.arrays() | lists

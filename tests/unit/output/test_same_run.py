@@ -1,0 +1,192 @@
+"""A restart begins only where all that it continues or replaces is of the same run."""
+
+import dataclasses
+
+import h5py
+import numpy as np
+import pytest
+
+from sph.errors import FileError
+from sph.output import checkpoint, files
+from sph.output.history import History, columns
+from sph.output.run_directory import RunDirectory
+
+
+def at_step(state, step, **changes):
+    changes = {"step": step, "time": 0.25 * step, "lineage": ()} | changes
+    return dataclasses.replace(state, **changes)
+
+
+def row(state):
+    p = state.particles
+    shared = dict.fromkeys(columns(p.dimension), 1.0) | {"limiter": "energy"}
+    return shared | {
+        "step": state.step,
+        "t": state.time,
+        "kinetic_energy": float(np.sum(0.5 * (p.mass * (p.velocity**2).sum(axis=0)))),
+        "internal_energy": float(np.sum(p.mass * p.internal_energy)),
+    }
+
+
+@pytest.fixture
+def state(make_state):
+    return make_state(dimension=1)
+
+
+@pytest.fixture
+def run(tmp_path, state):
+    """A run of steps 0 to 6, with a checkpoint every second."""
+    run = RunDirectory.create(tmp_path / "run")
+    run.write_config(state.config.to_toml())
+    history = History.create(run.history, 1, state.config.problem.diagnostics(state.particles))
+    for step in range(7):
+        history.append(row(at_step(state, step)))
+        if step % 2 == 0:
+            checkpoint.write(run.checkpoint_path(step // 2), at_step(state, step))
+    history.close()
+    return run
+
+
+def check(run, number=2, into=None):
+    path = run.checkpoint_path(number)
+    run.check_belongs(path, checkpoint.read(path), into)
+
+
+def refused(run, words, **settings):
+    with pytest.raises(FileError, match=words) as caught:
+        check(run, **settings)
+    assert "\nTry: " in str(caught.value)
+    assert caught.value.exit_code == 4
+
+
+def lines(run, change):
+    """Rewrite the lines of the history, the header first."""
+    text = run.history.read_text().splitlines(keepends=True)
+    run.history.write_text("".join(change(text)))
+
+
+def with_value(run, step, column, value):
+    def change(text):
+        names, values = text[0].rstrip().split(","), text[step + 1].rstrip().split(",")
+        values[names.index(column)] = value
+        text[step + 1] = ",".join(values) + "\n"
+        return text
+
+    lines(run, change)
+
+
+def test_a_run_as_it_was_written(run):
+    for number in range(4):
+        check(run, number)
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (lambda text: text[:3] + text[4:], "step 2 is missing before step 3"),
+        (lambda text: text[:-2], None),
+        (lambda text: text[:5], "step 4, that of the checkpoint, is missing"),
+        (lambda text: text[:1], "step 4, that of the checkpoint, is missing"),
+        (lambda text: [*text[:4], text[3], *text[4:]], "step 3 is missing before step 2"),
+        (lambda text: ["step,t\n"], "lacks the columns dt"),
+        (lambda text: [text[0].replace("energy_drift,", "drift,"), *text[1:]],
+         "lacks the columns energy_drift: .* another version"),
+        (lambda text: [text[0].replace("cpu_seconds\n", "cpu_seconds,strange\n"),
+                       *(one[:-1] + ",1.0\n" for one in text[1:])], "it has columns strange"),
+    ],
+)  # fmt: skip
+def test_a_history_with_a_gap_or_other_columns(run, change, words):
+    lines(run, change)
+    if words is None:  # what comes after the checkpoint is done anew
+        check(run)
+    else:
+        refused(run, words)
+
+
+@pytest.mark.parametrize(
+    ("step", "column", "value"),
+    [
+        (0, "energy_drift", "nan"),
+        (0, "kinetic_energy_without_bulk", "inf"),
+        (3, "cpu_seconds", "nan"),
+        (4, "t", "1.0000000000000002e0"),
+        (4, "internal_energy", "1.0"),
+        (4, "kinetic_energy", "1.0"),
+    ],
+)
+def test_a_history_of_other_values(run, step, column, value):
+    if column == "t":
+        value = "1.00001"
+    with_value(run, step, column, value)
+    refused(run, f"not of this run: {column} = {float(value)} at step {step}")
+
+
+def test_a_history_that_is_missing(run):
+    run.history.unlink()
+    refused(run, "there is no history")
+    check(run, 0)  # as a copied checkpoint that was not gone on from yet
+
+
+def test_a_configuration_of_another_problem(run, make_state):
+    run.write_config(make_state(dimension=2).config.to_toml())
+    refused(run, r"config\.toml is not of this run: problem\.dimension, problem\.domain")
+
+
+@pytest.mark.parametrize("number", [1, 3])  # the one before the checkpoint and the one after
+@pytest.mark.parametrize("what", ["dimension", "alpha", "step", "time", "lineage", "particles"])
+def test_a_checkpoint_of_another_run(run, state, make_state, number, what):
+    step = 2 * number
+    others = {
+        "dimension": at_step(make_state(dimension=2), step),
+        "alpha": at_step(state, step, config=state.config.override(["physics.alpha=3.0"])),
+        "step": at_step(state, 4, time=0.25 * step),
+        "time": at_step(state, step, time=1.0),
+        "lineage": at_step(state, step, lineage=("another run", "and more")[: 5 - step]),
+        "particles": at_step(make_state(dimension=1, number=49), step),
+    }
+    if what == "lineage" and number == 3:
+        checkpoint.write(run.checkpoint_path(2), at_step(state, 4, lineage=("ours",)))
+    checkpoint.write(run.checkpoint_path(number), others[what])
+    words = {
+        "dimension": r"problem\.dimension",
+        "alpha": "alpha = 1.0 and alpha = 3.0" if number == 3 else "alpha = 3.0 and alpha = 1.0",
+        "step": "do not come after step",
+        "time": "do not come after step",
+        "lineage": "its lineage does not continue",
+        "particles": "its particles are not those",
+    }
+    refused(run, f"is not of this run: .*{words[what]}")
+
+
+def test_a_session_may_have_other_settings_if_its_lineage_says_so(run, state):
+    later = at_step(
+        state, 6, lineage=("restarted",), config=state.config.override(["physics.alpha=3.0"])
+    )
+    checkpoint.write(run.checkpoint_path(3), later)
+    check(run)
+
+
+def test_a_newer_format_is_neither_passed_over_nor_replaced(run):
+    with h5py.File(run.checkpoint_path(3), "r+") as file:
+        file["Checkpoint"].attrs["format_version"] = 1000
+    with pytest.raises(FileError, match="a newer format"):
+        run.latest()
+    refused(run, "a newer format")
+    check(run, into=run.path.parent / "elsewhere")  # where nothing is replaced
+    refused(run, "a newer format", into=run.path / "." / "")
+
+
+def test_what_is_damaged_is_no_obstacle(run):
+    for number in (1, 3):
+        run.checkpoint_path(number).write_bytes(b"damaged")
+    check(run)
+    assert run.latest() == run.checkpoint_path(2)
+
+
+def test_a_checkpoint_that_cannot_be_read_is_not_passed_over(run, monkeypatch):
+    last = run.checkpoint_path(3)
+    last.unlink()
+    last.symlink_to(run.path)  # reading a directory fails, whoever reads
+    with pytest.raises(FileError, match="cannot read") as caught:
+        run.latest()
+    assert not isinstance(caught.value, files.Damaged)
