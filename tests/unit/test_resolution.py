@@ -232,3 +232,10 @@ def test_spacings_are_supports_over_their_number_of_spacings():
         ),
     )  # fmt: skip
     assert resolution._gap_of(simulation) == ("position", 1, 2.0**-32, 0.125)
+
+
+@pytest.mark.parametrize("none", [0.0, np.nan])
+def test_gas_without_sound_does_not_hide_other_gas(none):
+    sound_speed = np.array([none, none, 1e-10, 1.0])
+    gap = resolution.largest_gap(gas([8.0] * 4), 0.3, sound_speed)
+    assert gap == ("velocity", 2, 2.0**-49, 1e-10)
