@@ -175,6 +175,94 @@ def test_a_checkpoint_is_written_after_the_rows_up_to_it(session, simulation, mo
     assert simulation.clock.phases == ["diagnostics", "output", "output"]
 
 
+@pytest.fixture
+def closing(session, monkeypatch):
+    """A runner whose closing is told: ("summary" or "warn", what it was given), in order."""
+    told = []
+
+    def of_run(simulation, history, **given):
+        told.append(("summary", given | {"rows": len(history["step"])}))
+        return {"errors": None, "warnings": []}
+
+    monkeypatch.setattr(summary, "of_run", of_run)
+    monkeypatch.setattr(summary, "warn", lambda result, _: told.append(("warn", dict(result))))
+    monkeypatch.setattr(runner.reference, "Reference", lambda path: f"reference {path}")
+    monkeypatch.setattr(
+        runner.reference, "errors_against", lambda state, fine, where: (state, fine, where)
+    )
+    monkeypatch.setattr(runner, "state_of", lambda *given: "state")
+    one = session()
+    one._record()
+    one.lineage, one.told = ("one line",), told
+    one.written = []
+    monkeypatch.setattr(
+        RunDirectory, "write_summary", lambda _, result: one.written.append(dict(result))
+    )
+    return one
+
+
+def test_a_summary_is_of_all_rows_with_the_status_reason_and_lineage(closing):
+    closing._close("failed", "it broke")
+    given = {"status": "failed", "reason": "it broke", "lineage": ("one line",), "rows": 1}
+    assert closing.told == [("summary", given)]
+    assert len(closing.written) == 1
+
+
+@pytest.mark.parametrize("status", ["done", "stopped", "failed"])
+def test_errors_against_a_reference_are_taken_at_the_end_and_judged_then(closing, status):
+    closing.config = CONFIG.override(["report.reference=fine"])
+    result = closing._close(status)
+    if status != "done":
+        assert result["errors"] is None
+        assert len(closing.told) == len(closing.written) == 1
+        return
+    fine = closing.config.report.reference
+    assert fine.endswith("fine")
+    errors = ("state", f"reference {fine}", str(closing.directory.path))
+    assert result["errors"] == errors
+    # the summary is kept should the reference have gone
+    assert [one["errors"] for one in closing.written] == [None, errors]
+    assert closing.told[-1] == ("warn", closing.written[-1])
+
+
+@pytest.mark.parametrize(("saved_step", "number"), [(20, 3), (19, 4), (None, 4)])
+def test_a_stop_writes_a_checkpoint_unless_there_is_one_and_names_the_last(
+    closing, simulation, monkeypatch, saved_step, number
+):
+    written = []
+    monkeypatch.setattr(runner.checkpoints, "write", lambda path, state: written.append(path))
+    closing.progress.wrote = lambda path, simulation: None
+    closing.number, closing.saved_step = 3, saved_step
+    with pytest.raises(runner.Stopped) as caught:
+        closing._stop("SIGTERM")
+    assert len(written) == number - 3
+    last = closing.directory.checkpoint_path(number - 1)
+    assert f"stopped by SIGTERM at t = 0.25, step 20, with {last}." in str(caught.value)
+    assert closing.told[0][1]["reason"] == "SIGTERM"
+    assert closing.told[0][1]["status"] == "stopped"
+
+
+def test_a_run_shows_each_step_from_where_it_begins_to_its_end(closing, simulation, monkeypatch):
+    shown = []
+    closing.config = CONFIG.override(["time.end=0.5", "output.interval=0.125"])
+    simulation.scene.step_bounds = SimpleNamespace(held=(CONFIG.physics.C, "signal_speed"))
+
+    def advance(until):
+        simulation.time, simulation.step = min(until, simulation.time + 0.0625), simulation.step + 1
+
+    simulation.advance = advance
+    closing.progress.start = lambda *given: shown.append(given)
+    closing.progress.step = lambda given: shown.append(given.time)
+    closing.progress.wrote = lambda path, given: shown.append(path.name)
+    monkeypatch.setattr(runner.checkpoints, "write", lambda path, state: None)
+    closing._to_end()
+    assert shown == [
+        (0.25, 0.5), 0.3125, 0.375, "checkpoint_000000.h5", 0.4375, 0.5, "checkpoint_000001.h5",
+    ]  # fmt: skip
+    assert closing.told[-1][1]["rows"] == 5
+    assert closing.saved_step == 24
+
+
 # --- what it cost -----------------------------------------------------------------------------
 
 
