@@ -307,8 +307,8 @@ def test_the_front_may_be_given_in_any_order():
 
 
 def test_lines_are_in_the_order_of_their_numbers_and_runs_in_that_of_n(tmp_path):
-    for alpha, n in ((10.0, 200), (2.0, 400), (10.0, 100), (2.0, 90)):
-        write_run(tmp_path / "s" / f"{n},{alpha}", 1 / n, float(n),
+    for name, alpha, n in ((1, 10.0, 200), (2, 2.0, 400), (3, 10.0, 100), (4, 2.0, 90)):
+        write_run(tmp_path / "s" / f"{name}", 1 / n, float(n),
                   [f"physics.alpha={alpha}", f"problem.n={n}"])  # fmt: skip
     report = compared(tmp_path / "s")
     assert [line.label for line in report.series] == ["alpha = 2.0", "alpha = 10.0"]

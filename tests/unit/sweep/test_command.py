@@ -3,8 +3,9 @@
 import pytest
 
 from sph.errors import NumericalError, Stopped
+from sph.sweep import command
 from sph.sweep.command import _Told
-from sph.sweep.task import Outcome
+from sph.sweep.task import Outcome, Task
 
 DONE = Outcome("a", "done", how="run")
 WARNED = Outcome("b", "done", how="restart", warnings=("limit", "paired"))
@@ -50,3 +51,23 @@ def test_points_that_failed_come_before_those_that_were_stopped(told):
     assert str(caught.value) == "3 of 12 points are done, 1 failed:\n  c: no more"
     with pytest.raises(Stopped, match=r"^4 of 12 points are done; the same command"):
         told(DONE, WARNED, STOPPED)[0].closing()
+
+
+def test_a_sweep_runs_what_is_not_done_and_counts_the_rest(tmp_path, monkeypatch, capsys):
+    (tmp_path / "tube.toml").write_text('[problem]\nname = "shock_tube"\nn = 40\n')
+    names = [f"physics.C={value}" for value in (0.1, 0.2, 0.3)]
+    statuses = dict(zip(names, ("done", "failed", None), strict=True))
+    monkeypatch.setattr(Task, "status", property(lambda task: statuses[task.point.name]))
+    begun = []
+
+    def run(missing, tell):
+        for task in missing:
+            begun.append(task.point.name)
+            tell(Outcome(task.point.name, "done", how="run"))
+
+    monkeypatch.setattr(command, "_runner", lambda *_: run)
+    target = tmp_path / "sweep"
+    said = command.run(tmp_path / "tube.toml", ["physics.C=0.1,0.2,0.3"], [], target)
+    assert begun == names[1:]
+    assert said == "3 of 3 points are done."
+    assert "1 of 3 points are done already" in capsys.readouterr().err
