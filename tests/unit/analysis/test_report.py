@@ -315,6 +315,15 @@ def test_lines_are_in_the_order_of_their_numbers_and_runs_in_that_of_n(tmp_path)
     assert [row.n for row in report.rows] == [90, 400, 100, 200]
 
 
+def test_threads_change_no_result_and_what_failed_is_varied_too(tmp_path):
+    write_run(tmp_path / "s" / "1", 0.1, 1.0, ["run.threads=1"])
+    write_run(tmp_path / "s" / "2", 0.1, 1.0, ["run.threads=2"])
+    assert runs.varied_keys(runs.read([tmp_path / "s"])) == []
+    write_run(tmp_path / "s" / "3", None, 1.0, ["physics.alpha=2.0"], status="failed")
+    (line,) = compared(tmp_path / "s").series
+    assert line.label == "alpha = 1.0"
+
+
 def test_a_run_that_stopped_or_failed_is_not_compared_though_it_has_errors(study):
     for status in ("stopped", "failed"):
         write_run(study / status, 1e-6, 1e-6, ["problem.n=800"], status=status)
