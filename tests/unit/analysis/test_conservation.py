@@ -47,6 +47,10 @@ def test_energy_drift_is_the_last_and_the_largest_of_the_history():
     assert found["energy_drift_max"] == 0.05
 
 
+def test_energy_drift_keeps_its_sign():
+    assert kept(energy_drift=[0.0, 0.02, -0.05, -0.01])["energy_drift"] == -0.01
+
+
 def test_injected_energy_is_the_last_over_what_there_was():
     assert kept()["energy_injected"] == 0.4 / 8.0
 

@@ -228,3 +228,36 @@ def test_what_another_method_computed_is_not_called_exact(name):
     found = errors.against_exact(made_config, 0.0, state, np.ones(state.mass.size))
     expected = "the exact solution" if name == "shock_tube" else "a finite-volume solution"
     assert found["against"] == expected
+
+
+@pytest.mark.parametrize(
+    ("time", "departs", "with_history", "asked"),
+    [
+        (0.5, None, True, ["report", "compare", "over_time"]),
+        (0.5, None, False, ["report", "compare"]),
+        (0.6, None, True, ["report", "over_time"]),  # the history began while theory held
+        (0.5, "gravity", True, ["report"]),
+    ],
+)
+def test_figures_are_asked_for_where_they_mean_something(time, departs, with_history, asked):
+    problem = SimpleNamespace(
+        departs=lambda physics: departs, exact_ends=lambda eos: (0.5, "it breaks"),
+        report=lambda *given: {"report": given}, compare=lambda *given: {"compare": given},
+        over_time=lambda *given: {"over_time": given},
+    )  # fmt: skip
+    physics = SimpleNamespace(eos_model=lambda: "eos")
+    made_config = SimpleNamespace(problem=problem, physics=physics)
+    history = {"t": np.array([0.0, time])} if with_history else None
+    found = truth.figures(made_config, time, "particles", "pressure", history)
+    assert list(found) == asked
+    assert found["report"] == ("eos", time, "particles", "pressure")
+    assert found.get("over_time", ("eos", history)) == ("eos", history)
+
+
+def test_the_region_in_words_names_the_axes_with_ends_alone():
+    gas = made("uniform", "problem.boundary=['periodic', 'open']")
+    inside, words = truth.region(
+        gas.problem, gas.physics.eos_model(), 0.1, np.array([[0.5, 0.5], [0.5, 0.1]])
+    )
+    assert inside.tolist() == [True, False]
+    assert words == "0.1183 < y < 0.8817, where no wave from the domain's ends has come"
