@@ -239,3 +239,10 @@ def test_gas_without_sound_does_not_hide_other_gas(none):
     sound_speed = np.array([none, none, 1e-10, 1.0])
     gap = resolution.largest_gap(gas([8.0] * 4), 0.3, sound_speed)
     assert gap == ("velocity", 2, 2.0**-49, 1e-10)
+
+
+def test_a_place_that_is_not_a_number_does_not_hide_others():
+    particles = gas([0.0] * 4)
+    particles.position = np.array([[np.nan, 1.0, 2.0**20, 1.0]])
+    gap = resolution.largest_gap(particles, 0.25, 1.0)
+    assert gap == ("position", 2, 2.0**-32, 0.25)

@@ -283,3 +283,14 @@ def test_a_new_place_gets_the_history_and_the_checkpoints_up_to_the_one(place, t
     target, number = restarting._place_to_go_on(None, path, tmp_path / "lone")
     assert (number, [one.read_text() for one in target.checkpoints()]) == (0, ["1"])
     assert not target.history.exists()
+
+
+def test_a_coming_step_obeys_a_new_courant_number_and_a_new_limit_together():
+    before = configuration.from_text(TUBE).override(["physics.energy_limit=false"])
+    now = before.override(["physics.C=0.075", "physics.energy_limit=true"])
+    # 0.75 is the least of u/|du/dt|; gas without any energy sets none
+    energy, rate = np.array([3.0, 1.0, 0.0]), np.array([-4.0, 0.5, 9.0])
+    particles = SimpleNamespace(internal_energy=energy, energy_rate=rate)
+    for next_step, expected in ((1.0, 0.075 * 0.75), (0.01, 0.005)):
+        checkpoint = SimpleNamespace(config=before, particles=particles, next_step=next_step)
+        assert restarting._coming_step(now, checkpoint) == pytest.approx(expected, rel=1e-14)

@@ -208,7 +208,9 @@ def test_the_words_of_other_standings(tmp_path):
 
 
 def test_other_questions(study):
-    assert compared(study, norm="Linf").error[0] == pytest.approx(3.0)
+    largest = compared(study, norm="Linf")
+    assert largest.error[0] == pytest.approx(3.0)
+    assert "Linf error of density" in said(largest)
     assert compared(study, cost="wall").cost[0] == pytest.approx(0.5)
     by_updates = compared(study, cost="updates")
     # they cost the same updates at the same error: all are on the front
