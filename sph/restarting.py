@@ -168,12 +168,17 @@ def _note_other_settings(home: RunDirectory, before: Config, config: Config, pro
         written = configuration.load(home.config)
     except SphError:
         return
-    unused = set(map(str, restarts.changes(before, written)))
-    unused &= set(map(str, restarts.changes(config, written)))
-    for one in sorted(one for one in unused if not one.startswith("run.")):
+    given = {one.key for one in restarts.changes(before, config)}
+    differing = {one.key for one in restarts.changes(config, written)}
+    for one in restarts.changes(before, written):
+        if one.key not in differing or one.key.startswith("run."):
+            continue
+        instead = (
+            "that of --set" if one.key in given else "that of the checkpoint; --set changes it"
+        )
         progress.note(
-            f"{home.config} has {one.replace('(was', '(the checkpoint:', 1)}: going on with the "
-            "setting of the checkpoint; --set changes it"
+            f"{home.config} has {str(one).replace('(was', '(the checkpoint:', 1)}, which is not "
+            f"used: going on with {instead}"
         )
 
 

@@ -2,6 +2,7 @@
 
 import time
 from contextlib import closing
+from types import SimpleNamespace
 
 import pytest
 from numba import njit
@@ -93,3 +94,37 @@ def test_a_closed_clock_hears_nothing(clock):
     compiled(2.0)
     assert other.compiling == 0.0
     assert clock.compiling > 0.0
+
+
+@pytest.fixture
+def hands(monkeypatch):
+    """The times that a clock reads, to be set, and a clock that began at 10 s and 100 s."""
+    now = SimpleNamespace(cpu=10.0, wall=100.0)
+    read = SimpleNamespace(process_time=lambda: now.cpu, perf_counter=lambda: now.wall)
+    monkeypatch.setattr("sph.clock.time", read)
+    with closing(Clock()) as now.clock:
+        yield now
+
+
+def test_seconds_are_of_cpu_but_for_the_wall_since_the_clock_began(hands):
+    hands.cpu, hands.wall = 13.0, 107.0
+    assert (hands.clock.cpu, hands.clock.wall) == (3.0, 7.0)
+
+
+def test_compilations_add_up_and_an_inner_one_is_part_of_the_outer(hands):
+    clock = hands.clock
+    with clock.phase("work"):
+        hands.cpu += 1.0
+        for length in (2.0, 4.0):
+            clock.on_start(None)
+            hands.cpu += length
+            clock.on_start(None)
+            hands.cpu += length
+            clock.on_end(None)
+            clock.on_end(None)
+    with clock.phase("work"):
+        hands.cpu += 8.0
+        hands.wall += 50.0
+    assert clock.compiling == 12.0
+    assert clock.seconds == {"work": 9.0}
+    assert clock.cpu == 21.0

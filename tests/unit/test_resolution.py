@@ -127,3 +127,115 @@ def test_a_dense_cloud_far_from_0_is_found_among_others(simulate):
     gap = resolution.largest_gap(particles, np.array([1.0, 1.0, 1e-13, 1.0]), np.ones(4))
     assert (gap.kind, gap.index) == ("position", 2)
     assert gap.ratio > resolution.REFUSED
+
+
+def test_gaps_are_those_of_the_largest_component_and_of_velocities_beside_the_median():
+    """Of three particles: y at 2^20, whose gap is 2^-32, and speeds about a median of 2^10."""
+    particles = SimpleNamespace(
+        mass=np.ones(3),
+        position=np.array([[0.0, 1.0, 1.0], [0.0, 0.0, 2.0**20]]),
+        velocity=np.array([[0.0, 0.0, 0.0], [2.0**10, 2.0**10 + 3.0, -1e6]]),
+    )
+    gap = resolution.largest_gap(particles, np.array([1.0, 1.0, 0.5]), 1.0)
+    assert gap == ("position", 2, 2.0**-32, 0.5)
+    assert gap.ratio == 2.0**-31
+    near = SimpleNamespace(**vars(particles) | {"position": np.zeros((2, 3))})
+    # the first is one sound speed from what can be lost, the second four
+    assert resolution.largest_gap(near, 1.0, 1.0) == ("velocity", 0, 2.0**-42, 1.0)
+
+
+@pytest.fixture
+def far(monkeypatch):
+    """far(kind, ratio): a simulation whose last particle has that gap over its scale."""
+
+    def made(kind, ratio):
+        gap = resolution.Gap(kind, 2, ratio * 8.0, 8.0)
+        monkeypatch.setattr(resolution, "_gap_of", lambda _: gap)
+        particles = SimpleNamespace(
+            id=np.array([5, 6, 9]), position=np.array([[1.0, 2.0, 3.0], [4.0, 5.0, 6.0]]),
+            velocity=-np.array([[1.0, 2.0, 3.0], [4.0, 5.0, 6.0]]),
+        )  # fmt: skip
+        return SimpleNamespace(particles=particles, step=0, time=0.0)
+
+    return made
+
+
+@pytest.mark.parametrize(
+    ("kind", "place", "words", "remedy"),
+    [
+        ("position", "(3, 6)", "the particle spacing (8)", "problem.domain"),
+        ("velocity", "(-3, -6)", "the speed of sound (8)", "bulk velocity"),
+    ],
+)
+def test_words_name_the_particle_its_gap_and_what_it_is_a_share_of(far, kind, place, words, remedy):
+    simulation = far(kind, 2e-3)
+    with pytest.raises(NumericalError) as caught:
+        resolution.check(simulation)
+    assert caught.value.particle == 9
+    said = str(caught.value)
+    assert f"the {kind} {place} of particle 9: the next number is 0.016 away, 0.002 of" in said
+    assert words in said
+    assert remedy in said.partition("Try:")[2]
+    doubt = resolution.doubt(simulation)
+    assert "errors up to 0.01. Try" in doubt  # five times the ratio
+    assert remedy in doubt.partition("Try:")[2]
+
+
+@pytest.mark.parametrize("kind", ["position", "velocity"])
+def test_the_thresholds_are_those_of_the_ratio(far, kind):
+    for ratio, is_refused in ((2.1e-4, True), (1.9e-4, False)):
+        simulation = far(kind, ratio)
+        if is_refused:
+            with pytest.raises(NumericalError):
+                resolution.check(simulation)
+        else:
+            resolution.check(simulation)
+    assert resolution.doubt(far(kind, 2.1e-7)) is not None
+    assert resolution.doubt(far(kind, 1.9e-7)) is None
+
+
+@pytest.mark.parametrize(("dimension", "gap", "is_refused"), [
+    (2, 2.0**-15, True), (2, 2.0**-16, False), (3, 2.0**-14, True), (3, 2.0**-15, False),
+])  # fmt: skip
+def test_before_there_are_supports_the_spacing_is_what_the_box_holds_on_average(
+    dimension, gap, is_refused
+):
+    """64 particles in a box of 1: spacings of 1/8 and 1/4, of which 2e-4 is 2^-15.3 and 2^-14.3."""
+    place = gap * 2.0**52
+    domain = SimpleNamespace(box=np.array([[place, place + 1.0]] * dimension))
+    simulation = SimpleNamespace(
+        scene=SimpleNamespace(domain=domain),
+        particles=SimpleNamespace(
+            number=64, id=np.arange(64), mass=np.ones(64), velocity=np.zeros((dimension, 64)),
+            position=np.full((dimension, 64), place),
+        ), step=0, time=0.0,
+    )  # fmt: skip
+    if is_refused:
+        with pytest.raises(NumericalError, match="does not resolve the position"):
+            resolution.check_extent(simulation)
+    else:
+        resolution.check_extent(simulation)
+
+
+def test_spacings_are_supports_over_their_number_of_spacings():
+    """H is 4 spacings; a particle without a support has an error of its own."""
+    eos = SimpleNamespace(
+        pressure=lambda density, energy: density * energy,
+        sound_speed=lambda density, p: p / density,
+    )
+    simulation = SimpleNamespace(
+        scene=SimpleNamespace(models=SimpleNamespace(support_ratio=2.5, eta=1.6), eos=eos),
+        particles=SimpleNamespace(
+            mass=np.ones(3), density=np.array([1.0, 1.0, -1.0]), internal_energy=np.ones(3),
+            support=np.array([1.0, 0.5, 1e-30]), velocity=np.zeros((1, 3)),
+            position=np.full((1, 3), 2.0**20),
+        ),
+    )  # fmt: skip
+    assert resolution._gap_of(simulation) == ("position", 1, 2.0**-32, 0.125)
+
+
+@pytest.mark.parametrize("none", [0.0, np.nan])
+def test_gas_without_sound_does_not_hide_other_gas(none):
+    sound_speed = np.array([none, none, 1e-10, 1.0])
+    gap = resolution.largest_gap(gas([8.0] * 4), 0.3, sound_speed)
+    assert gap == ("velocity", 2, 2.0**-49, 1e-10)

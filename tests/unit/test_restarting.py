@@ -3,11 +3,14 @@
 import hashlib
 import json
 import shutil
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from click.testing import CliRunner
 
+from sph import config as configuration
+from sph import restarting
 from sph.cli import main
 from sph.output import checkpoint as checkpoints
 from sph.output.run_directory import RunDirectory
@@ -194,3 +197,89 @@ def test_a_restart_that_is_killed_has_recorded_its_settings(run, tmp_path, monke
     found = json.loads(run.summary.read_text())["settings_changed"]
     assert found == json.loads(whole.summary.read_text())["settings_changed"]
     assert "physics.alpha = 2.0 (was 1.0), physics.C = 0.1 (was 0.15) at t = 0.02" in found
+
+
+# --- what is decided before anything is changed ------------------------------------------------
+
+
+@pytest.fixture
+def place(tmp_path):
+    """A run directory with three checkpoints, of which there is nothing but the names."""
+    run = RunDirectory.create(tmp_path / "place")
+    for number in range(3):
+        run.checkpoint_path(number).write_text(f"{number}")
+    run.history.write_text("step,t\n")
+    return run
+
+
+@pytest.mark.parametrize(
+    ("summary", "number", "expected"),
+    [
+        (None, 2, True),
+        (None, 1, False),
+        ("{", 2, True),
+        ("[]", 2, True),
+        ('{"status": "done"}', 2, True),
+        ('{"status": "done", "time": 0.5}', 2, False),
+        ('{"status": "failed", "time": 0.5}', 2, True),
+        ('{"status": "done", "time": 0.25}', 2, True),
+    ],
+)
+def test_a_summary_is_missing_where_the_last_checkpoint_has_none_of_its_own(
+    place, summary, number, expected
+):
+    if summary is not None:
+        place.summary.write_text(summary)
+    path = place.checkpoint_path(number)
+    assert restarting._is_last_without_summary(place, path, 0.5) == expected
+    assert not restarting._is_last_without_summary(None, path, 0.5)
+
+
+@pytest.mark.parametrize(
+    ("has_failed", "why"), [(True, "energy had drifted"), (False, "cannot be read")]
+)
+def test_checkpoints_after_the_good_one_are_told_with_their_reason(place, has_failed, why):
+    if has_failed:
+        place.write_summary({"status": "failed"})
+    notes = []
+    restarting._note_damaged(place, place.checkpoint_path(1), SimpleNamespace(note=notes.append))
+    (note,) = notes
+    assert "checkpoint_000002.h5 is passed over" in note
+    assert why in note
+    assert "checkpoint_000001.h5" in note
+
+
+def test_settings_of_a_file_that_are_not_used_are_told_but_for_threads(place):
+    before = configuration.from_text(TUBE)
+    notes = []
+
+    def told(written, *overrides):
+        notes.clear()
+        place.write_config(before.override(written).to_toml())
+        progress = SimpleNamespace(note=notes.append)
+        restarting._note_other_settings(place, before, before.override(overrides), progress)
+        return len(notes)
+
+    assert told([]) == 0
+    assert told(["run.threads=2"]) == 0
+    assert told(["physics.alpha=2.0", "physics.C=0.1"]) == 2
+    assert told(["physics.alpha=2.0"], "physics.alpha=2.0") == 0  # which is what goes on
+    assert told(["physics.alpha=2.0"]) == 1
+    assert "has physics.alpha = 2.0 (the checkpoint: 1.0)" in notes[0]
+    assert "going on with that of the checkpoint" in notes[0]
+    assert told(["physics.alpha=2.0"], "physics.alpha=3.0") == 1
+    assert "going on with that of --set" in notes[0]
+    assert told([], "physics.alpha=3.0") == 0  # the file has what the checkpoint has
+
+
+def test_a_new_place_gets_the_history_and_the_checkpoints_up_to_the_one(place, tmp_path):
+    path = place.checkpoint_path(1)
+    target, number = restarting._place_to_go_on(place, path, tmp_path / "new")
+    assert number == 1
+    assert [one.read_text() for one in target.checkpoints()] == ["0", "1"]
+    assert target.history.read_text() == "step,t\n"
+    for directory in (None, place.path):
+        assert restarting._place_to_go_on(place, path, directory) == (place, 1)
+    target, number = restarting._place_to_go_on(None, path, tmp_path / "lone")
+    assert (number, [one.read_text() for one in target.checkpoints()]) == (0, ["1"])
+    assert not target.history.exists()

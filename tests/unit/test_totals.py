@@ -5,6 +5,7 @@ import pytest
 
 from sph import config as configuration
 from sph import totals
+from sph.external.point_mass import PointMass
 from sph.particles import Particles
 from sph.totals import Baseline
 
@@ -50,6 +51,41 @@ def test_volume_is_the_sum_of_mass_over_density():
     particles = gas(dimension=3)
     expected = (particles.mass / particles.density).sum()
     assert totals.of(particles, None, np.ones(3)).volume == pytest.approx(expected, rel=1e-14)
+
+
+def test_every_sum_and_extreme_is_that_of_its_particles():
+    particles = gas(dimension=3)
+    particles.acceleration[:] = RANDOM.normal(size=(3, 50))
+    particles.energy_rate[:] = RANDOM.normal(size=50)
+    p, field = particles, PointMass(2.0, 0.1)
+    found = totals.of(p, field, np.ones(3))
+    expected = {
+        "kinetic_energy": 0.5 * p.mass @ (p.velocity**2).sum(axis=0),
+        "internal_energy": p.mass @ p.internal_energy,
+        "potential_energy": p.mass @ field.potential(p.position),
+        "min_density": p.density.min(),
+        "max_density": p.density.max(),
+        "min_internal_energy": p.internal_energy.min(),
+        "max_internal_energy": p.internal_energy.max(),
+        "rates": p.acceleration.sum() + p.energy_rate.sum(),
+    }
+    # sums of 50 to 200 terms in another order, those of the rates with either sign
+    assert {name: getattr(found, name) for name in expected} == pytest.approx(
+        expected, rel=1e-13, abs=1e-13
+    )
+    assert found.momentum == pytest.approx(p.velocity @ p.mass, rel=1e-12)
+    parts = found.internal_energy + found.potential_energy
+    assert found.energy == pytest.approx(found.kinetic_energy + parts, rel=1e-15)
+    without_bulk = found.kinetic_energy_without_bulk + parts
+    assert found.energy_without_bulk == pytest.approx(without_bulk, rel=1e-15)
+    assert totals.of(p, None, np.ones(3)).potential_energy == 0.0
+
+
+def test_a_baseline_in_the_middle_of_a_run_has_drifted_by_nothing():
+    now = totals.of(gas(), PointMass(2.0, 0.1), np.ones(2))
+    baseline = Baseline.at(now, added=0.5)
+    assert abs(baseline.drift(now, added=0.5)) < 1e-15  # round-off
+    assert baseline.drift(now, added=0.0) == pytest.approx(0.5 / baseline.scale, rel=1e-12)
 
 
 @pytest.mark.parametrize(

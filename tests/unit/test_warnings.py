@@ -179,7 +179,8 @@ class Scene:
 
     def __init__(self, limits=None, swamped=None):
         self.held_supports = 0
-        self.scene = self.config = self.problem = self
+        self.max_support, self.number = 0.125, 40
+        self.scene = self.config = self.problem = self.particles = self
         self.swamped = swamped or {}
         self.allowed = lambda: limits or {}
 
@@ -224,6 +225,103 @@ def test_bounds_of_what_is_conserved(told, kept, expected):
 def test_half_a_spacing_to_the_nearest_neighbour_tells_of_pairs(told):
     assert told(median=0.49) == ["paired"]
     assert told(median=0.51) == []  # particles at random places begin with .54
+
+
+@pytest.fixture
+def texts(monkeypatch):
+    """texts(simulation, **summary): the warnings of a run by their kinds, in order."""
+    monkeypatch.setattr(warnings.resolution, "doubt", lambda _: "far from 0")
+    whole = {
+        "conservation": KEPT, "errors": None, "report": {}, "nearest": {"median": 1.0},
+    }  # fmt: skip
+
+    def made(simulation=None, **changed):
+        found = warnings.of_run(simulation or Scene(), whole | changed)
+        return {one.kind: one.text for one in found}
+
+    return made
+
+
+def test_texts_have_the_numbers_of_the_run(texts):
+    alone = Scene()
+    alone.held_supports = 3
+    wrong = {"energy_drift_max": 0.0213, "momentum_change": 0.5, "volume_ratio": 0.8}
+    found = texts(alone, conservation=KEPT | wrong, nearest={"median": 0.25, "smallest": 0.1})
+    assert list(found) == [
+        "energy_drift", "momentum", "volume", "held_supports", "resolution", "paired",
+    ]  # fmt: skip
+    assert "drifted by 2.1 %, more than 0.1 %" in found["energy_drift"]
+    assert "changed by 0.5 of" in found["momentum"]
+    # densities are as much too high as volumes are too small: 1/0.8
+    assert "m/rho is 0.8 of" in found["volume"]
+    assert "by 25 %" in found["volume"]
+    assert "3 of 40 particles" in found["held_supports"]
+    assert "held at 0.125" in found["held_supports"]
+    assert found["resolution"] == "far from 0"
+    assert "neighbour is 0.25 of" in found["paired"]
+
+
+@pytest.mark.parametrize("wrong", ["momentum_change", "volume_ratio"])
+def test_what_is_not_a_number_is_not_kept(texts, wrong):
+    kind = wrong.partition("_")[0]
+    assert kind in texts(conservation=KEPT | {wrong: float("nan")})
+
+
+def test_pairs_are_told_by_the_median_and_not_by_a_pair(texts):
+    assert "paired" not in texts(nearest={"median": 0.9, "smallest": 0.0})
+    assert "paired" not in texts(nearest=None)  # of a run that failed
+
+
+def test_limits_are_told_with_their_side_and_reason(texts):
+    limits = {"high": Limit(2.0, "as so"), "low": Limit(2.0, "as so", at_least=True)}
+    found = texts(Scene(limits=limits), report={"high": 2.5, "low": 2.5})
+    assert found["limit"] == "high is 2.5, above the limit of 2 (as so)."
+    found = texts(Scene(limits=limits), report={"high": 1.5, "low": 1.5})
+    assert found["limit"] == "low is 1.5, below the limit of 2 (as so)."
+    assert "limit" not in texts(Scene(limits=limits), report={"high": 2.0, "low": 2.0})
+
+
+def test_a_signal_that_is_lost_comes_first(texts):
+    lost = Scene(swamped={"wave": Limit(0.5, "half of it")})
+    found = texts(lost, report={"wave": 0.75}, conservation=KEPT | {"energy_drift_max": 1.0})
+    assert list(found)[:2] == ["swamped", "energy_drift"]
+    assert "wave is 0.75, above the limit of 0.5 (half of it)" in found["swamped"]
+
+
+def test_a_limit_beside_a_signal_that_is_not_lost_is_told(told):
+    both = {"limits": {"wave": Limit(0.1, "so")}, "swamped": {"wave": Limit(0.5, "so")}}
+    assert told(report={"wave": 0.2}, **both) == ["limit"]
+    assert told(report={"wave": 0.6}, **both) == ["swamped"]
+
+
+def test_figures_are_named_as_problems_name_them():
+    fields = {"density": {"L1": 0.25, "L2": 0.5}}
+    summary = {
+        "errors": {"fields": fields}, "report": {"peak": 3.0}, "conservation": KEPT | {
+            "energy_drift": 1e-9, "energy_drift_max": 2e-9, "momentum_change": 4.0},
+    }  # fmt: skip
+    expected = {
+        "l1.density": 0.25, "l1.velocity": None, "peak": 3.0, "energy_drift": 2e-9,
+        "momentum_change": 4.0, "nothing": None,
+    }  # fmt: skip
+    assert {name: warnings.figure(summary, name) for name in expected} == expected
+    unjudged = summary | {"errors": None, "report": None}
+    assert warnings.figure(unjudged, "l1.density") is None
+    assert warnings.figure(unjudged, "peak") is None
+
+
+def test_kinds_are_told_once_each_in_order_and_not_of_old_summaries():
+    told = [{"kind": kind} for kind in ("volume", "limit", "limit", "energy_drift", "volume")]
+    assert warnings.kinds({"warnings": told}) == ["volume", "limit", "energy_drift"]
+    assert warnings.kinds({}) == []
+
+
+@pytest.mark.parametrize(("at_least", "value", "holds"), [
+    (False, 1.0, True), (False, 1.1, False), (False, float("nan"), False),
+    (True, 1.0, True), (True, 0.9, False), (True, float("nan"), False),
+])  # fmt: skip
+def test_a_limit_holds_on_its_bound_and_for_numbers_alone(at_least, value, holds):
+    assert Limit(1.0, "so", at_least).holds(value) == holds
 
 
 def test_a_figure_is_told_once(told):

@@ -87,3 +87,39 @@ def test_no_error_without_an_exact_solution(tube):
     _, particles, pressure = tube
     made = config.from_text('[problem]\nname = "kelvin_helmholtz"\n')
     assert errors.against_exact(made, 0.1, particles, pressure) is None
+
+
+def test_relative_errors_are_over_the_exact_field_in_the_region_by_volume():
+    """Of three particles, the last of which is outside: volumes 1 and 3."""
+    state = {
+        "density": np.array([2.5, 4.5, 90.0]),
+        "velocity": np.array([[3.0, 0.0, 90.0], [4.0, 1.0, 90.0]]),
+        "pressure": np.array([0.5, 0.0, 1.0]),
+    }
+    exact = {
+        "density": np.array([2.0, 5.0, 1.0]),
+        "velocity": np.array([[3.0, 0.0, 0.0], [4.0, 2.0, 0.0]]),
+        "pressure": np.array([0.0, 0.0, 5.0]),
+    }
+    volume, inside = np.array([1.0, 3.0, 7.0]), np.array([True, True, False])
+    found = errors.by_field(state, exact, volume, inside)
+    assert found["density"] == pytest.approx(
+        {"L1": 0.5, "L2": 0.5, "Linf": 0.5, "relative_L1": 0.5 / (17.0 / 4.0)}, rel=ROUND_OFF
+    )
+    # differences of 0 and 1, and speeds of 5 and 2
+    assert found["velocity"]["relative_L1"] == pytest.approx(0.75 / (11.0 / 4.0), rel=ROUND_OFF)
+    assert found["pressure"]["L1"] == 0.125
+    assert found["pressure"]["relative_L1"] is None  # of a field that is zero there
+    assert set(found) == set(state)  # internal energy is not in this exact solution
+
+
+def test_volumes_are_those_of_the_particles_and_not_the_exact_ones(tube):
+    made, particles, pressure = tube
+    x = particles.position[0]
+    inside = (x > -0.2) & (x < 0.3)
+    particles.mass = np.linspace(0.01, 0.05, x.size)
+    particles.density *= np.linspace(1.0, 2.0, x.size)
+    error = np.where(np.arange(x.size) % 2, 0.5, 0.0)
+    found = errors.against_exact(made, 0.1, particles, pressure + error)["fields"]["pressure"]
+    volume = (particles.mass / particles.density)[inside]
+    assert found["L1"] == pytest.approx(np.average(error[inside], weights=volume), rel=ROUND_OFF)

@@ -13,7 +13,7 @@ from click.testing import CliRunner
 
 from sph import config as configuration
 from sph.analysis import report as reports
-from sph.analysis.report import front, runs, words
+from sph.analysis.report import front, runs, table, words
 from sph.cli import main
 from sph.errors import ConfigError, FileError
 from sph.output.run_directory import RunDirectory
@@ -297,6 +297,142 @@ def test_wrong_questions(study, tmp_path):
     (point / "config.toml").write_text("problem = 1\n")
     with pytest.raises(FileError, match=r"config\.toml cannot be read"):
         compared(study)
+
+
+def test_the_front_may_be_given_in_any_order():
+    cost, error = np.array([4.0, 1.0, 2.0]), np.array([2.0, 8.0, 4.0])
+    # power laws: cost = 8/error, so that 3 takes 8/3
+    assert front.cost_at(3.0, cost, error) == pytest.approx(8 / 3, rel=ROUND_OFF)
+    assert front.cost_at(2.0, cost, error) == pytest.approx(4.0, rel=ROUND_OFF)
+
+
+def test_lines_are_in_the_order_of_their_numbers_and_runs_in_that_of_n(tmp_path):
+    for name, alpha, n in ((1, 10.0, 200), (2, 2.0, 400), (3, 10.0, 100), (4, 2.0, 90)):
+        write_run(tmp_path / "s" / f"{name}", 1 / n, float(n),
+                  [f"physics.alpha={alpha}", f"problem.n={n}"])  # fmt: skip
+    report = compared(tmp_path / "s")
+    assert [line.label for line in report.series] == ["alpha = 2.0", "alpha = 10.0"]
+    assert [row.n for row in report.rows] == [90, 400, 100, 200]
+
+
+def test_threads_change_no_result_and_what_failed_is_varied_too(tmp_path):
+    write_run(tmp_path / "s" / "1", 0.1, 1.0, ["run.threads=1"])
+    write_run(tmp_path / "s" / "2", 0.1, 1.0, ["run.threads=2"])
+    assert runs.varied_keys(runs.read([tmp_path / "s"])) == []
+    write_run(tmp_path / "s" / "3", None, 1.0, ["physics.alpha=2.0"], status="failed")
+    (line,) = compared(tmp_path / "s").series
+    assert line.label == "alpha = 1.0"
+
+
+def test_a_run_that_stopped_or_failed_is_not_compared_though_it_has_errors(study):
+    for status in ("stopped", "failed"):
+        write_run(study / status, 1e-6, 1e-6, ["problem.n=800"], status=status)
+    report = compared(study)
+    assert report.on_front.sum() == 3
+    assert {row.name for row in report.without} == {"stopped", "failed"}
+
+
+def test_only_sizes_of_numbers_above_zero_are_errors(tmp_path):
+    figures = {"negative": -2.0, "zero": 0.0, "true": True, "word": "nan", "none": None}
+    (row,) = runs.read([write_run(tmp_path / "run", 0.1, 1.0, report=figures)])
+    found = {name: row.error(f"report.{name}", "L1") for name in figures}
+    assert found == dict.fromkeys(figures) | {"negative": 2.0}
+    assert row.error("report", "L1") is None
+    assert row.error("density", "L2") == 0.2
+    assert row.error("report.negative.more", "L1") is None
+
+
+def test_errors_against_a_run_take_the_place_of_the_summarys(tmp_path):
+    (row,) = runs.read([write_run(tmp_path / "run", 0.1, 1.0)])
+    assert row.truth is None
+    row.reference = {"reference": "fine", "fields": {"velocity": {"L1": 0.5}}}
+    assert (row.truth, row.error("velocity", "L1"), row.error("density", "L1")) == (
+        "fine",
+        0.5,
+        None,
+    )
+    assert row.figures()[0] == "velocity"
+
+
+def test_updates_of_a_restarted_run_are_those_of_all_its_steps(tmp_path):
+    (row,) = runs.read([write_run(tmp_path / "run", 0.1, 5.0, ["problem.n=100"], steps=250)])
+    assert row.cost["updates"] == 25_000
+    assert row.is_restarted
+
+
+def test_factors_are_told_from_the_least_to_the_most(tmp_path):
+    for alpha, n, error, cpu in (
+        (1.0, 100, 1.0, 1.0), (1.0, 200, 0.5, 4.0),
+        (2.0, 100, 1.0, 2.0), (2.0, 200, 0.5, 16.0),
+        (3.0, 100, 1.0, 1.02), (3.0, 200, 0.5, 12.0),
+        (4.0, 100, 2.0, 3.0), (4.0, 200, 0.5, 12.0),
+    ):  # fmt: skip
+        write_run(tmp_path / "s" / f"{alpha},{n}", error, cpu,
+                  [f"physics.alpha={alpha}", f"problem.n={n}"])  # fmt: skip
+    text = said(compared(tmp_path / "s"))
+    assert "alpha = 2.0 is never on the front: 2 to 4 times the CPU time" in text
+    assert "alpha = 3.0 is never on the front: up to 3 times the CPU time" in text
+    # a bound where all of a line are less accurate than the front, and one of these is not
+    assert "alpha = 4.0 is never on the front: 3 times the CPU time" in text
+
+
+def test_the_line_that_comes_first_is_told_too(tmp_path):
+    for alpha, factor in ((1.0, 3.0), (2.0, 1.0)):
+        for n in (100, 200):
+            write_run(tmp_path / "s" / f"{alpha},{n}", 1 / n, factor * n,
+                      [f"physics.alpha={alpha}", f"problem.n={n}"])  # fmt: skip
+    text = said(compared(tmp_path / "s"))
+    assert "alpha = 1.0 is never on the front: 3 times" in text
+    assert "alpha = 1.0: order 1.00" in text
+    assert "alpha = 2.0: order 1.00" in text
+
+
+def test_settings_changed_on_the_way_are_told_with_or_without_an_error(study):
+    for name, error in (("with", 0.3), ("without", None)):
+        write_run(study / name, error, 50.0, ["problem.n=300"], settings_changed=[f"C of {name}"])
+    text = said(compared(study))
+    for name in ("with", "without"):
+        assert f"{name} changed its settings on the way: C of {name}." in text
+
+
+def test_restarts_matter_for_times_alone(study):
+    write_run(study / "restarted", 0.3, 50.0, ["problem.n=300"], steps=200)
+    assert "took to start: restarted." in said(compared(study, cost="wall"))
+    assert "took to start" not in said(compared(study, cost="n"))
+
+
+def test_a_record_has_all_there_is_of_a_run(tmp_path):
+    warned = [{"kind": "limit"}, {"kind": "volume"}]
+    write_run(tmp_path / "s" / "a", 0.1, 5.0, ["problem.n=100"], warnings=warned, steps=250)
+    write_run(tmp_path / "s" / "b", None, 1.0, ["problem.n=200"], status="failed", reason="no")
+    report = compared(tmp_path / "s")
+    first, second = table._records(report)
+    assert first == {
+        "run": "a", "status": "done", "reason": "", "problem.n": "100", "particles": 100,
+        "steps": 250, "updates": 25_000, "cpu_seconds": 5.0, "wall_seconds": 2.5,
+        "compile_cpu_seconds": 10.0, "threads": 2, "warnings": "limit volume",
+        "density_error.L1": 0.1, "density_error.L2": 0.2, "density_error.Linf": pytest.approx(0.3),
+        "report.radius_error": -0.1, "conservation.energy_drift": -1e-5,
+        "conservation.energy_drift_max": 2e-5, "conservation.momentum_change": None,
+        "error": 0.1, "excess": 1.0, "on_front": True,
+    }  # fmt: skip
+    assert (second["run"], second["status"], second["reason"]) == ("b", "failed", "no")
+    assert "error" not in second
+    header, line = table._cells(report)
+    assert header[-1] == "warnings"
+    assert line == ["100", "250", "5", "0.1", "2.0e-05", "front", "limit, volume"]
+
+
+def test_lines_of_the_json_have_both_their_fits(study):
+    found = json.loads(table.as_json(compared(study), []))["series"]
+    assert [line["order"] for line in found] == pytest.approx([1.0, 1.0], rel=ROUND_OFF)
+    assert [line["exponent"] for line in found] == pytest.approx([-0.5, -0.5], rel=ROUND_OFF)
+    assert found[0]["runs"] == [f"n={n},alpha=1.0" for n in (100, 200, 400)]
+
+
+def test_points_that_have_a_run_are_not_listed_a_second_time(tmp_path):
+    sweep = sweep_of(tmp_path / "alpha", "1.0,2.0", 1.0)
+    assert [row.status for row in runs.read([sweep])] == ["done"] * 4
 
 
 def test_a_report_is_not_written_through_a_link(study, tmp_path):

@@ -1,89 +1,146 @@
-"""What a summary says was kept, each figure from a history made by hand."""
+"""The closing words of a run, and what a summary has of one that was stopped or failed."""
 
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from sph.analysis.summary import baseline, conservation
-from sph.eos.ideal_gas import IdealGas
+from sph.analysis import summary
+from sph.analysis.summary import in_words
 
-EOS = IdealGas(1.4)
-
-
-def history(**columns):
-    """Four steps; E_0 = 2 + 6 = 8 without bulk motion."""
-    rows = {
-        "kinetic_energy": [100.0, 100.0, 100.0, 100.0],
-        "kinetic_energy_without_bulk": [2.0, 2.5, 2.0, 2.0],
-        "internal_energy": [6.0, 6.0, 6.0, 6.0],
-        "total_energy": [106.0, 106.0, 106.0, 106.0],
-        "energy_drift": [0.0, 0.02, -0.05, 0.01],
-        "energy_injected": [0.0, 0.1, 0.2, 0.4],
-        "momentum_x": [5.0, 5.0, 5.0, 5.0],
-        "momentum_y": [-1.0, -1.0, -1.0, -1.0],
-    } | columns
-    return {name: np.array(values) for name, values in rows.items()}
-
-
-def state(velocity=((3.0, 5.0), (0.0, 0.0)), mass=(1.0, 1.0)):
-    """Two particles of density 1.4 and sound speed 2 (P = 4)."""
-    n = len(mass)
-    density = np.full(n, 1.4)
-    return SimpleNamespace(
-        velocity=np.array(velocity), mass=np.array(mass), density=density,
-        pressure_by=lambda eos: np.full(n, 4.0),
-    )  # fmt: skip
+COST = {
+    "cpu_seconds": 80.0, "wall_seconds": 90.0, "threads": 2,
+    "session": {
+        "steps": 15, "updates": 1500, "updates_per_cpu_second": 1234567, "cpu_seconds": 3.0,
+        "wall_seconds": 2.0, "compile_cpu_seconds": 1.5,
+    },
+}  # fmt: skip
+KEPT = {
+    "energy_drift": 1e-9, "energy_drift_max": 2e-5, "energy_injected": 0.0,
+    "momentum_change": 3e-15, "volume_ratio": 0.98765, "volume_ratio_worst": 0.5,
+}  # fmt: skip
+ERRORS = {
+    "against": "the exact solution",
+    "region": "x > 0",
+    "fields": {
+        "density": {"L1": 0.01, "relative_L1": 0.025},
+        "internal_energy": {"L1": 0.02, "relative_L1": None},
+    },
+}
+DONE = {
+    "status": "done", "problem": "uniform", "particles": 100, "time": 0.25, "steps": 20,
+    "warnings": [], "settings_changed": [], "errors": ERRORS, "errors_left_out": None,
+    "report": {"peak_density": 4.5}, "conservation": KEPT, "cost": COST,
+}  # fmt: skip
 
 
-def kept(particles=None, keeps=(1.0, 1.0), **columns):
-    scene = SimpleNamespace(eos=EOS, keeps_momentum=np.array(keeps))
-    return conservation(history(**columns), particles or state(), scene)
+def lines(**changed):
+    return in_words(DONE | changed).splitlines()
 
 
-def test_energy_drift_is_the_last_and_the_largest_of_the_history():
-    found = kept()
-    assert found["energy_drift"] == 0.01
-    assert found["energy_drift_max"] == 0.05
+def test_each_figure_is_told_with_its_name():
+    first, errors, figure, kept, cost = lines()
+    assert first == "uniform: 100 particles to t = 0.25 in 20 steps (done)."
+    assert "exact solution" in errors
+    assert errors.endswith("x > 0): density 0.01 (2.5 %), internal energy 0.02.")
+    assert figure == "  peak density: 4.5"
+    assert "energy to 2e-05;" in kept
+    assert "momentum to 3e-15;" in kept
+    assert kept.endswith("0.9877 of the volume.")
+    assert "2 s, 3 CPU s on 2 thread" in cost
+    assert "1.5 s compiling; 1,234,567 particle updates" in cost
 
 
-def test_injected_energy_is_the_last_over_what_there_was():
-    assert kept()["energy_injected"] == 0.4 / 8.0
+def test_what_was_not_kept_by_the_equations_alone_is_told():
+    def kept(**changed):
+        return lines(conservation=KEPT | changed)[3]
+
+    assert "(1.5e-05 of it to keep internal energies positive)" in kept(energy_injected=1.5e-5)
+    assert "positive" not in kept()
+    assert "momentum is not conserved" in kept(momentum_change=None)
+    assert "m/rho" not in kept(volume_ratio=None)
 
 
-def test_the_baseline_is_the_first_row_without_bulk_motion():
-    assert baseline(history()) == (8.0, 8.0)
-    bound = baseline(history(potential_energy=[-7.0, 0.0, 0.0, 0.0]))
-    assert bound == (1.0, 8.0)
+@pytest.mark.parametrize(("count", "words"), [(1, "1 warning)"), (2, "2 warnings)")])
+def test_warnings_and_changed_settings_come_before_all_figures(count, words):
+    told = [{"kind": "limit", "text": f"text {i}"} for i in range(count)]
+    found = lines(warnings=told, settings_changed=["a = 1", "b = 2"])
+    assert found[0].endswith(f"(done, with {words}.")
+    assert found[1 : 1 + count] == [f"Warning: text {i}" for i in range(count)]
+    assert found[1 + count].endswith("a = 1; b = 2.")
+    assert found[2 + count].startswith("Error")
 
 
-@pytest.mark.parametrize("axis", ["x", "y"])
-def test_momentum_change_is_the_worst_of_all_steps_and_axes(axis):
-    column = {f"momentum_{axis}": [1.0, 4.0, -2.0, 1.0]}
-    # sum m (|v - bulk| + c) of speeds 3 and 5, whose mean is 4: 1 + 1 + 2 + 2
-    assert kept(**column)["momentum_change"] == pytest.approx(3.0 / 6.0, rel=1e-14)
+def test_an_error_larger_than_its_field_is_a_multiple_of_it():
+    def told(relative):
+        return lines(errors=ERRORS | {"fields": {"density": {"L1": 1.0, "relative_L1": relative}}})[
+            1
+        ]
+
+    assert told(0.996).endswith("density 1 (1e+02 %).")
+    assert told(1.0).endswith("density 1 (1 times its size).")
 
 
-def test_momentum_change_does_not_shrink_under_a_boost():
-    moved = state(velocity=((1003.0, 1005.0), (-70.0, -70.0)))
-    column = {"momentum_x": [0.0, 3.0, 0.0, 0.0]}
-    # the difference of 1005 and the mean rounds at 1e-13
-    assert kept(moved, **column)["momentum_change"] == pytest.approx(3.0 / 6.0, rel=1e-12)
+def test_errors_against_a_run_name_it_and_errors_left_out_say_why():
+    assert "against the run fine/run" in lines(errors=ERRORS | {"reference": "fine/run"})[1]
+    assert "left out, because it is dark." in lines(errors=None, errors_left_out="it is dark")[1]
 
 
-def test_axes_that_do_not_keep_momentum_are_left_out():
-    column = {"momentum_x": [1.0, 4.0, 1.0, 1.0], "momentum_y": [0.0, 0.0, 0.0, -1.0]}
-    # along x the mean motion of 4 is none that could be taken off: speeds 3 and 5
-    found = kept(keeps=(0.0, 1.0), **column)["momentum_change"]
-    assert found == pytest.approx(1.0 / (3.0 + 5.0 + 2.0 + 2.0), rel=1e-14)
-    assert kept(keeps=(0.0, 0.0), **column)["momentum_change"] is None
+@pytest.fixture
+def of_run(monkeypatch):
+    """of_run(status, reference): the summary of a simulation of which nothing is worked out."""
+    for name in ("conservation", "cost"):
+        monkeypatch.setattr(summary, name, lambda *_, name=name: name)
+    monkeypatch.setattr(summary.errors, "against_exact", lambda *_: "errors")
+    monkeypatch.setattr(summary.truth, "left_out", lambda *_: "why not")
+    monkeypatch.setattr(summary.truth, "figures", lambda *_: "figures")
+    monkeypatch.setattr(summary.warnings, "of_run", lambda *_: [summary.warnings.Warning("a", "b")])
+
+    def made(status, reference=None, lineage=()):
+        config = SimpleNamespace(
+            problem=SimpleNamespace(name="uniform"), report=SimpleNamespace(reference=reference),
+            time=SimpleNamespace(end=9.0),
+        )  # fmt: skip
+        particles = SimpleNamespace(number=3, position=None, pressure_by=lambda eos: None)
+        simulation = SimpleNamespace(
+            scene=SimpleNamespace(
+                config=config, dimension=2, eos=None, parts=lambda: (["i"], ["o"])
+            ),
+            particles=particles, time=0.25, step=20,
+            nearest=lambda: np.array([0.9, 1.1, 0.2]),
+        )  # fmt: skip
+        return summary.of_run(simulation, {}, status, "a reason", lineage)
+
+    return made
 
 
-@pytest.mark.parametrize(
-    ("ratio", "last", "worst"),
-    [([1.0, 0.8, 1.1, 0.99], 0.99, 0.8), ([1.0, 0.9, 1.3, 1.01], 1.01, 1.3)],
-)
-def test_volume_ratio_is_the_last_and_that_farthest_from_one(ratio, last, worst):
-    found = kept(volume_ratio=ratio)
-    assert (found["volume_ratio"], found["volume_ratio_worst"]) == (last, worst)
-    assert kept()["volume_ratio"] is None
+def test_a_run_that_is_done_has_all_there_is(of_run):
+    lineage = (
+        "restarted at step 1, t = 0.125 with physics.alpha = 2.0 (was 1.0)",
+        "restarted at step 2, t = 0.25",
+    )
+    found = of_run("done", lineage=lineage)
+    assert found.pop("version")
+    assert found == {
+        "status": "done", "reason": "a reason", "warnings": [{"kind": "a", "text": "b"}],
+        "problem": "uniform", "dimension": 2, "particles": 3, "time": 0.25, "steps": 20,
+        "lineage": list(lineage),
+        "settings_changed": ["physics.alpha = 2.0 (was 1.0) at t = 0.125"],
+        "errors": "errors", "errors_left_out": "why not", "report": "figures",
+        "conservation": "conservation", "nearest": {"median": 0.9, "smallest": 0.2},
+        "cost": "cost", "compiled_in": ["i"], "left_out": ["o"],
+    }  # fmt: skip
+
+
+def test_a_run_that_failed_is_not_judged(of_run):
+    found = of_run("failed")
+    assert (found["errors"], found["report"], found["nearest"]) == (None, None, None)
+    assert "failed" in found["errors_left_out"]
+    assert found["warnings"]
+
+
+def test_errors_against_a_reference_are_left_to_the_end_of_the_run(of_run):
+    done, stopped = (of_run(status, reference="fine") for status in ("done", "stopped"))
+    assert (done["errors"], done["errors_left_out"]) == (None, None)
+    assert (stopped["errors"], done["report"], stopped["report"]) == (None, "figures", "figures")
+    assert "stopped before" in stopped["errors_left_out"]

@@ -102,3 +102,38 @@ def test_the_lineage_tells_what_was_changed_and_when():
     assert first == "physics.alpha = 2.0 (was 1.0) at t = 0.125"
     assert second.startswith("physics.conductivity = {")
     assert second.endswith("(was not given) at t = 0.15")
+
+
+def test_a_change_is_told_with_what_is_now_and_what_was():
+    one = restarts.Change("physics.alpha", 1.0, 2.5, "recorded")
+    assert str(one) == "physics.alpha = 2.5 (was 1.0)"
+    assert str(one._replace(was=None)) == "physics.alpha = 2.5 (was not given)"
+    assert str(one._replace(now=None)) == "physics.alpha = not given (was 1.0)"
+
+
+@pytest.mark.parametrize(
+    ("was", "now", "kind"),
+    [
+        (1.0, {"min": 0.1}, "one number"),
+        ({"min": 0.1}, 1.5, "a table"),
+        ("name", 1.5, "a name"),
+        (None, 1.5, "none"),
+    ],
+)
+def test_a_kind_that_changes_is_refused_by_what_it_was(was, now, kind):
+    one = restarts.Change("physics.alpha", was, now, "same kind")
+    (line,) = restarts.refusals([one])
+    assert line.startswith("physics.alpha = ")
+    assert "1.5" in line or "min" in line
+    assert line.endswith(f": expected {kind}, as in the checkpoint")
+    assert restarts.refusals([one._replace(now=was)]) == []
+    assert restarts.refusals([one._replace(rule="recorded")]) == []
+
+
+def test_a_change_within_its_kind_goes_into_the_lineage_in_all_its_digits():
+    alike = restarts.Change("physics.heating", {"energy": 1.0}, {"energy": 2.0}, "same kind")
+    free = restarts.Change("run.threads", 1, 2, "free")
+    line = restarts.lineage(7, 0.1234567890123, [free, alike])
+    assert line.startswith("restarted at step 7, t = 0.1234567890123 with physics.heating = ")
+    assert "threads" not in line
+    assert restarts.settings_changed([line])[0].endswith(" at t = 0.123457")

@@ -5,8 +5,11 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from sph.analysis.report.runs import Row
 from sph.output.checkpoint import Checkpoint
+from sph.output.history import History
 from sph.particles import Particles
+from sph.stress import verdict as verdicts
 from sph.stress.case import ALWAYS, Bound, Case, Failing
 from sph.stress.figures import Figures
 from sph.stress.verdict import (
@@ -108,3 +111,136 @@ def test_relative_errors_are_of_the_region_alone(tmp_path):
     assert figures.value("relative.density.L1") == 0.375  # of volumes that are one
     figures._last.time = 0.6
     assert np.isnan(figures.value("relative.density.L1"))
+
+
+def test_only_a_pass_and_a_failure_as_written_are_expected():
+    expected = {
+        one for one in (PASS, SHORT, AS_WRITTEN, OTHERWISE, UNEXPECTED)
+        if Result("case", "setting", one, "", (), {}, {}).is_expected
+    }  # fmt: skip
+    assert expected == {PASS, AS_WRITTEN}
+
+
+def test_every_broken_check_is_told():
+    missing = Check("c", float("nan"), Bound(at_least=1.0, why="-"))
+    said = "b is 3, expected at most 2; c is not there, expected at least 1"
+    assert _verdict(None, (BROKEN, HOLDS, missing), "") == (SHORT, said)
+    # the first line of why a run ended goes before
+    assert _verdict(None, (BROKEN,), "it broke\nTry: more") == (SHORT, "it broke")
+
+
+HISTORY = {
+    "limiter": ["energy", "energy", "support", "growth"],
+    "dt": [0.4, 0.1, 0.2, 0.3],
+    "min_internal_energy": [3.0, 1.0, 2.0, 4.0],
+    "min_density": [5.0, 6.0, 2.0, 3.0],
+    "max_density": [9.0, 9.0, 9.0, 9.0],
+}
+
+
+@pytest.fixture
+def ended(tmp_path):
+    """Figures of a run of four steps, whose first and last states are there."""
+    history = History.create(tmp_path / "history.csv", 1)
+    for step in range(4):
+        row = dict.fromkeys(history.columns, 0.0) | {"step": step}
+        history.append(row | {name: values[step] for name, values in HISTORY.items()})
+    history.close()
+    warned = [{"kind": "paired"}, {"kind": "limit"}, {"kind": "limit"}]
+    summary = {
+        "warnings": warned, "steps": 3, "report": {"peak": -2.0}, "time": 0.5, "particles": 3,
+        "errors": {"fields": {"density": {"L1": 0.25, "L2": 0.5}}},
+        "conservation": {"energy_drift": 1e-5, "energy_drift_max": 2e-5},
+        "cost": {"cpu_seconds": 5.0, "wall_seconds": 7.0, "session": {
+            "steps": 3, "compile_cpu_seconds": 6.0, "phases_cpu_seconds": {}}},
+    }  # fmt: skip
+    found = Figures(tmp_path, summary)
+    found._first = state([[3.0, 0.0, 1.0], [4.0, 2.0, 0.0]], [1.0, 2.0, 4.0], [0, 1, 2])
+    found._last = state([[-3.0, 0.0, 1.0], [4.0, -2.0, 0.0]], [1.0, 1.0, 5.0], [1, 2, 0])
+    return found
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [
+        ("history.dt.first", 0.4),
+        ("history.dt.last", 0.3),
+        ("history.dt.min", 0.1),
+        ("history.dt.max", 0.4),
+        ("history.limiter.energy", 0.5),  # of all rows
+        ("history.limiter.acceleration", 0.0),
+        ("state.velocity.max", 5.0),
+        ("state.velocity.min", 1.0),
+        ("state.internal_energy.max", 5.0),
+        ("state.internal_energy.min", 1.0),
+        ("change.internal_energy", 0.5),  # from 2 to 1
+        ("change.velocity", 6.0 / 5.0),
+        ("warnings.paired", 1.0),
+        ("warnings.limit", 1.0),  # a kind is told once
+        ("warnings.volume", 0.0),
+        ("errors.density.L2", 0.5),
+        ("report.peak", -2.0),
+        ("steps", 3.0),
+        ("report.none", np.nan),
+        ("errors.pressure.L1", np.nan),
+        ("history.none.min", np.nan),
+        ("state.none.min", np.nan),
+    ],
+)
+def test_a_figure_of_each_kind(ended, name, value):
+    assert ended.value(name) == pytest.approx(value, nan_ok=True, rel=1e-15)
+
+
+def test_first_and_last_are_those_checkpoints(tmp_path, monkeypatch):
+    found = Figures(tmp_path, {})
+    monkeypatch.setattr(type(found.run), "checkpoints", lambda _: ["first", "second", "last"])
+    monkeypatch.setattr("sph.output.checkpoint.read", lambda path: path)
+    assert (found._first, found._last) == ("first", "last")
+
+
+def test_figures_of_a_sign_and_of_unequal_volumes(tmp_path):
+    """Relative to the size of what is exact, which may be negative, and weighed by m/rho."""
+    problem = SimpleNamespace(
+        exact=lambda *_: {"density": np.array([-1.0, 2.0])},
+        error_region=lambda *_: (np.array([True, True]), "all"),
+        departs=lambda _: None, exact_ends=lambda _: (0.5, "it does"),
+        undisturbed=lambda *_: np.array([[-np.inf, np.inf]]),
+    )  # fmt: skip
+    physics = SimpleNamespace(eos_model=lambda: None)
+    particles = SimpleNamespace(
+        position=np.zeros((1, 2)), mass=np.array([3.0, 2.0]), density=np.array([1.0, 2.0])
+    )
+    figures = Figures(tmp_path, {})
+    figures._last = SimpleNamespace(
+        time=0.0, field=lambda _: np.array([-1.5, 2.0]), particles=particles,
+        config=SimpleNamespace(problem=problem, physics=physics),
+    )  # fmt: skip
+    assert figures.value("relative.density.Linf") == 0.5
+    assert figures.value("relative.density.L1") == 0.5 * 3.0 / 4.0
+
+
+def test_columns_of_every_case_are_the_worst_of_the_run(ended, tmp_path):
+    row = Row(tmp_path, "a", {"physics.scheme": "grad_h"}, ended.summary, "done")
+    assert verdicts._numbers(row, ended) == {
+        "scheme": "grad_h",
+        "particles": 3,
+        "energy_drift": 2e-5,
+        "lowest_internal_energy": 1.0,
+        "lowest_density": 2.0,
+        "steps": 3,
+        "smallest_step": 0.1,
+        "cpu_seconds": 0.0,  # and not below: it compiled for longer than it ran
+    }
+    assert verdicts._numbers(None, ended) == {}
+
+
+def test_a_run_without_a_summary_is_judged_by_why_it_never_was(tmp_path, monkeypatch):
+    task = SimpleNamespace(run=SimpleNamespace(path=tmp_path), status=None)
+    monkeypatch.setattr(verdicts, "standing", lambda _: SimpleNamespace(reason="the disk is full"))
+    case = Case(
+        name="case", title="-", hard="-", configuration={},
+        settings={"one": {"about": "-", "limits": {"steps": {"at_most": 1.0, "why": "-"}}}},
+    )  # fmt: skip
+    found = verdicts.judge(case, "one", task)
+    assert (found.verdict, found.reason, found.numbers) == (SHORT, "the disk is full", {})
+    assert not any(check.holds for check in found.checks)

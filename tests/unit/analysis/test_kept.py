@@ -1,0 +1,89 @@
+"""What a summary says was kept, each figure from a history made by hand."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from sph.analysis.summary import baseline, conservation
+from sph.eos.ideal_gas import IdealGas
+
+EOS = IdealGas(1.4)
+
+
+def history(**columns):
+    """Four steps; E_0 = 2 + 6 = 8 without bulk motion."""
+    rows = {
+        "kinetic_energy": [100.0, 100.0, 100.0, 100.0],
+        "kinetic_energy_without_bulk": [2.0, 2.5, 2.0, 2.0],
+        "internal_energy": [6.0, 6.0, 6.0, 6.0],
+        "total_energy": [106.0, 106.0, 106.0, 106.0],
+        "energy_drift": [0.0, 0.02, -0.05, 0.01],
+        "energy_injected": [0.0, 0.1, 0.2, 0.4],
+        "momentum_x": [5.0, 5.0, 5.0, 5.0],
+        "momentum_y": [-1.0, -1.0, -1.0, -1.0],
+    } | columns
+    return {name: np.array(values) for name, values in rows.items()}
+
+
+def state(velocity=((3.0, 5.0), (0.0, 0.0)), mass=(1.0, 1.0)):
+    """Two particles of density 1.4 and sound speed 2 (P = 4)."""
+    n = len(mass)
+    density = np.full(n, 1.4)
+    return SimpleNamespace(
+        velocity=np.array(velocity), mass=np.array(mass), density=density,
+        pressure_by=lambda eos: np.full(n, 4.0),
+    )  # fmt: skip
+
+
+def kept(particles=None, keeps=(1.0, 1.0), **columns):
+    scene = SimpleNamespace(eos=EOS, keeps_momentum=np.array(keeps))
+    return conservation(history(**columns), particles or state(), scene)
+
+
+def test_energy_drift_is_the_last_and_the_largest_of_the_history():
+    found = kept()
+    assert found["energy_drift"] == 0.01
+    assert found["energy_drift_max"] == 0.05
+
+
+def test_injected_energy_is_the_last_over_what_there_was():
+    assert kept()["energy_injected"] == 0.4 / 8.0
+
+
+def test_the_baseline_is_the_first_row_without_bulk_motion():
+    assert baseline(history()) == (8.0, 8.0)
+    bound = baseline(history(potential_energy=[-7.0, 0.0, 0.0, 0.0]))
+    assert bound == (1.0, 8.0)
+
+
+@pytest.mark.parametrize("axis", ["x", "y"])
+def test_momentum_change_is_the_worst_of_all_steps_and_axes(axis):
+    column = {f"momentum_{axis}": [1.0, 4.0, -2.0, 1.0]}
+    # sum m (|v - bulk| + c) of speeds 3 and 5, whose mean is 4: 1 + 1 + 2 + 2
+    assert kept(**column)["momentum_change"] == pytest.approx(3.0 / 6.0, rel=1e-14)
+
+
+def test_momentum_change_does_not_shrink_under_a_boost():
+    moved = state(velocity=((1003.0, 1005.0), (-70.0, -70.0)))
+    column = {"momentum_x": [0.0, 3.0, 0.0, 0.0]}
+    # the difference of 1005 and the mean rounds at 1e-13
+    assert kept(moved, **column)["momentum_change"] == pytest.approx(3.0 / 6.0, rel=1e-12)
+
+
+def test_axes_that_do_not_keep_momentum_are_left_out():
+    column = {"momentum_x": [1.0, 4.0, 1.0, 1.0], "momentum_y": [0.0, 0.0, 0.0, -1.0]}
+    # along x the mean motion of 4 is none that could be taken off: speeds 3 and 5
+    found = kept(keeps=(0.0, 1.0), **column)["momentum_change"]
+    assert found == pytest.approx(1.0 / (3.0 + 5.0 + 2.0 + 2.0), rel=1e-14)
+    assert kept(keeps=(0.0, 0.0), **column)["momentum_change"] is None
+
+
+@pytest.mark.parametrize(
+    ("ratio", "last", "worst"),
+    [([1.0, 0.8, 1.1, 0.99], 0.99, 0.8), ([1.0, 0.9, 1.3, 1.01], 1.01, 1.3)],
+)
+def test_volume_ratio_is_the_last_and_that_farthest_from_one(ratio, last, worst):
+    found = kept(volume_ratio=ratio)
+    assert (found["volume_ratio"], found["volume_ratio_worst"]) == (last, worst)
+    assert kept()["volume_ratio"] is None

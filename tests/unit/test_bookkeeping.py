@@ -1,0 +1,294 @@
+"""What a session writes down of a simulation, each number in its place; without a run."""
+
+import math
+from contextlib import contextmanager
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from sph import config as configuration
+from sph import runner
+from sph.analysis import summary
+from sph.integrators.step_size import StepLimit
+from sph.output.history import History
+from sph.output.history import read as read_history
+from sph.output.run_directory import RunDirectory
+from sph.runner import Runner
+from sph.totals import Totals
+
+CONFIG = configuration.from_text('[problem]\nname = "kelvin_helmholtz"\nn = 100\n')
+TOTALS = Totals(
+    kinetic_energy=1.0, kinetic_energy_without_bulk=2.0, internal_energy=3.0, potential_energy=4.0,
+    momentum=np.array([5.0, 6.0]), volume=7.0, min_density=8.0, max_density=9.0,
+    min_internal_energy=10.0, max_internal_energy=11.0, rates=12.0,
+)  # fmt: skip
+OF_EVERY_RUN = {
+    "step": 20, "t": 0.25, "dt": 0.125, "limiter_particle": 17, "limiter": "energy",
+    "kinetic_energy": 1.0, "kinetic_energy_without_bulk": 2.0, "internal_energy": 3.0,
+    "total_energy": 8.0, "energy_drift": -0.01, "energy_injected": 13.0,
+    "momentum_x": 5.0, "momentum_y": 6.0, "min_density": 8.0, "max_density": 9.0,
+    "min_internal_energy": 10.0, "max_internal_energy": 11.0,
+}  # fmt: skip
+
+
+class Clock:
+    """A clock that stands at 2 s of wall-clock and 3 s of CPU time, and knows its phases."""
+
+    wall, cpu, compiling = 2.0, 3.0, 1.0
+
+    def __init__(self):
+        self.seconds, self.phases = {"rates": 0.5, "density": 0.25}, []
+
+    @contextmanager
+    def phase(self, name):
+        self.phases.append(name)
+        yield
+
+
+@pytest.fixture
+def simulation():
+    scene = SimpleNamespace(
+        config=CONFIG, max_support=math.inf, is_filled=False, external=None, heating=None
+    )
+    return SimpleNamespace(
+        step=20, steps_here=15, time=0.25, limit=StepLimit(0.125, 17, "energy"), totals=TOTALS,
+        energy_drift=-0.01, energy_injected=13.0, energy_added=14.0, held_supports=3,
+        volume_ratio=0.97, list_builds=6, clock=Clock(), scene=scene,
+        team=SimpleNamespace(threads=2),
+        particles=SimpleNamespace(
+            number=100, position=np.ones((2, 4)), velocity=np.ones((2, 4)), mass=np.ones(4),
+            density=np.ones(4),
+        ),
+    )  # fmt: skip
+
+
+@pytest.fixture
+def session(tmp_path, simulation):
+    """session(past=()): a runner whose history has these rows of `OF_EVERY_RUN` changed."""
+    directory = RunDirectory(tmp_path)
+
+    def made(past=(), extra=()):
+        history = History.create(directory.history, 2, [*extra, "mode_amplitude"])
+        start = OF_EVERY_RUN | {"wall_seconds": 1.0, "cpu_seconds": 1.5, "mode_amplitude": 0.0}
+        for row in past:
+            history.append(start | row)
+        history.flush()
+        progress = SimpleNamespace(notes=[], closed=0)
+        one = Runner(CONFIG, directory, simulation, history, progress, [])
+        one.past = lambda: read_history(directory.history)
+        return one
+
+    return made
+
+
+def recorded(one):
+    """The row that a runner adds to its history, without the seconds and what the problem adds."""
+    one._record()
+    one.history.flush()
+    row = {name: values[-1] for name, values in one.past().items()}
+    return {
+        name: row[name]
+        for name in row
+        if name not in ("wall_seconds", "cpu_seconds", "mode_amplitude")
+    }
+
+
+def test_a_row_of_the_history_has_each_sum_in_its_column(session, simulation):
+    assert recorded(session()) == OF_EVERY_RUN
+    assert simulation.clock.phases == ["diagnostics"]
+
+
+OF_SOME_RUNS = {
+    "held_supports": ("max_support", 1.0, 3),
+    "volume_ratio": ("is_filled", True, 0.97),
+    "potential_energy": ("external", "a field", 4.0),
+    "energy_added": ("heating", "a source", 14.0),
+}
+
+
+@pytest.mark.parametrize("column", OF_SOME_RUNS)
+def test_columns_of_some_scenes_are_there_where_they_mean_something(session, simulation, column):
+    name, value, expected = OF_SOME_RUNS[column]
+    setattr(simulation.scene, name, value)
+    assert recorded(session(extra=[column])) == OF_EVERY_RUN | {column: expected}
+    assert runner._of_the_scene(simulation) == {column: expected}
+
+
+def test_what_was_counted_before_a_restart_is_taken_from_the_last_row(session, simulation):
+    begun = []
+    simulation.go_on_from = begun.append
+    past = [
+        {"wall_seconds": 1.0, "cpu_seconds": 1.5, "energy_injected": 0.5, "energy_added": 0.25,
+         "kinetic_energy_without_bulk": 30.0, "internal_energy": 40.0},
+        {"wall_seconds": 4.0, "cpu_seconds": 6.0, "energy_injected": 0.75, "energy_added": -0.5},
+    ]  # fmt: skip
+    one = session(past, extra=["energy_added"])
+    one._closing = contextmanager(lambda: (yield))
+    one._to_end = lambda: "ended"
+    assert one.from_checkpoint() == "ended"
+    assert (simulation.energy_injected, simulation.energy_added) == (0.75, -0.5)
+    assert [baseline.energy for baseline in begun] == [70.0]
+    assert len(one.past()["step"]) == 2  # the checkpoint's row is there
+    simulation.scene.heating = "a source"
+    one._record()
+    one.history.flush()
+    # 4 + 2 and 6 + 3
+    assert (one.past()["wall_seconds"][-1], one.past()["cpu_seconds"][-1]) == (6.0, 9.0)
+
+
+def test_a_lone_checkpoint_begins_its_history(session, simulation):
+    one = session()
+    one._closing = contextmanager(lambda: (yield))
+    one._to_end = lambda: "ended"
+    assert one.from_checkpoint() == "ended"
+    one.history.flush()
+    assert (one.past()["wall_seconds"], one.past()["cpu_seconds"]) == ([2.0], [3.0])
+    assert simulation.energy_injected == 13.0
+
+
+def test_a_session_closes_its_history_progress_and_threads_however_it_ends(session, simulation):
+    one, closed = session(), []
+    for name, thing in (("history", one.history), ("progress", one.progress),
+                        ("simulation", simulation)):  # fmt: skip
+        thing.close = lambda name=name: closed.append(name)
+    with pytest.raises(ZeroDivisionError), one._closing():
+        raise ZeroDivisionError
+    assert closed == ["history", "progress", "simulation"]
+
+
+def test_a_checkpoint_is_written_after_the_rows_up_to_it(session, simulation, monkeypatch):
+    one, written = session(), []
+    monkeypatch.setattr(
+        runner.checkpoints,
+        "write",
+        lambda path, state: written.append((path, len(one.past()["step"]))),
+    )
+    monkeypatch.setattr(runner, "state_of", lambda *_: None)
+    one.progress.wrote = lambda path, simulation: None
+    one._record()
+    for _ in range(2):
+        one._write_checkpoint()
+    paths = [one.directory.checkpoint_path(number) for number in (0, 1)]
+    assert written == [(paths[0], 1), (paths[1], 1)]
+    assert (one.number, one.saved_step) == (2, 20)
+    assert simulation.clock.phases == ["diagnostics", "output", "output"]
+
+
+@pytest.fixture
+def closing(session, monkeypatch):
+    """A runner whose closing is told: ("summary" or "warn", what it was given), in order."""
+    told = []
+
+    def of_run(simulation, history, **given):
+        told.append(("summary", given | {"rows": len(history["step"])}))
+        return {"errors": None, "warnings": []}
+
+    monkeypatch.setattr(summary, "of_run", of_run)
+    monkeypatch.setattr(summary, "warn", lambda result, _: told.append(("warn", dict(result))))
+    monkeypatch.setattr(runner.reference, "Reference", lambda path: f"reference {path}")
+    monkeypatch.setattr(
+        runner.reference, "errors_against", lambda state, fine, where: (state, fine, where)
+    )
+    monkeypatch.setattr(runner, "state_of", lambda *given: "state")
+    one = session()
+    one._record()
+    one.lineage, one.told = ("one line",), told
+    one.written = []
+    monkeypatch.setattr(
+        RunDirectory, "write_summary", lambda _, result: one.written.append(dict(result))
+    )
+    return one
+
+
+def test_a_summary_is_of_all_rows_with_the_status_reason_and_lineage(closing):
+    closing._close("failed", "it broke")
+    given = {"status": "failed", "reason": "it broke", "lineage": ("one line",), "rows": 1}
+    assert closing.told == [("summary", given)]
+    assert len(closing.written) == 1
+
+
+@pytest.mark.parametrize("status", ["done", "stopped", "failed"])
+def test_errors_against_a_reference_are_taken_at_the_end_and_judged_then(closing, status):
+    closing.config = CONFIG.override(["report.reference=fine"])
+    result = closing._close(status)
+    if status != "done":
+        assert result["errors"] is None
+        assert len(closing.told) == len(closing.written) == 1
+        return
+    fine = closing.config.report.reference
+    assert fine.endswith("fine")
+    errors = ("state", f"reference {fine}", str(closing.directory.path))
+    assert result["errors"] == errors
+    # the summary is kept should the reference have gone
+    assert [one["errors"] for one in closing.written] == [None, errors]
+    assert closing.told[-1] == ("warn", closing.written[-1])
+
+
+@pytest.mark.parametrize(("saved_step", "number"), [(20, 3), (19, 4), (None, 4)])
+def test_a_stop_writes_a_checkpoint_unless_there_is_one_and_names_the_last(
+    closing, simulation, monkeypatch, saved_step, number
+):
+    written = []
+    monkeypatch.setattr(runner.checkpoints, "write", lambda path, state: written.append(path))
+    closing.progress.wrote = lambda path, simulation: None
+    closing.number, closing.saved_step = 3, saved_step
+    with pytest.raises(runner.Stopped) as caught:
+        closing._stop("SIGTERM")
+    assert len(written) == number - 3
+    last = closing.directory.checkpoint_path(number - 1)
+    assert f"stopped by SIGTERM at t = 0.25, step 20, with {last}." in str(caught.value)
+    assert closing.told[0][1]["reason"] == "SIGTERM"
+    assert closing.told[0][1]["status"] == "stopped"
+
+
+def test_a_run_shows_each_step_from_where_it_begins_to_its_end(closing, simulation, monkeypatch):
+    shown = []
+    closing.config = CONFIG.override(["time.end=0.5", "output.interval=0.125"])
+    simulation.scene.step_bounds = SimpleNamespace(held=(CONFIG.physics.C, "signal_speed"))
+
+    def advance(until):
+        simulation.time, simulation.step = min(until, simulation.time + 0.0625), simulation.step + 1
+
+    simulation.advance = advance
+    closing.progress.start = lambda *given: shown.append(given)
+    closing.progress.step = lambda given: shown.append(given.time)
+    closing.progress.wrote = lambda path, given: shown.append(path.name)
+    monkeypatch.setattr(runner.checkpoints, "write", lambda path, state: None)
+    closing._to_end()
+    assert shown == [
+        (0.25, 0.5), 0.3125, 0.375, "checkpoint_000000.h5", 0.4375, 0.5, "checkpoint_000001.h5",
+    ]  # fmt: skip
+    assert closing.told[-1][1]["rows"] == 5
+    assert closing.saved_step == 24
+
+
+# --- what it cost -----------------------------------------------------------------------------
+
+
+def test_cost_is_of_this_session_beside_the_seconds_of_all(simulation):
+    history = {"cpu_seconds": np.array([1.0, 8.0]), "wall_seconds": np.array([2.0, 9.0])}
+    found = summary.cost(simulation, history)
+    assert found["session"].pop("peak_memory_bytes") > 1e6
+    assert found == {
+        "cpu_seconds": 8.0,
+        "wall_seconds": 9.0,
+        "threads": 2,
+        "session": {
+            "steps": 15,
+            "updates": 1500,
+            "updates_per_cpu_second": 750,  # in the 2 s that were not spent compiling
+            "cpu_seconds": 3.0,
+            "wall_seconds": 2.0,
+            "compile_cpu_seconds": 1.0,
+            "phases_cpu_seconds": {"rates": 0.5, "density": 0.25},
+            "list_builds": 6,
+        },
+    }
+    simulation.clock.compiling = 3.0
+    assert summary.cost(simulation, history)["session"]["updates_per_cpu_second"] is None
+
+
+def test_memory_is_in_bytes():
+    # of Python with NumPy: between 20 MB and 20 GB
+    assert 2e7 < summary.peak_memory() < 2e10

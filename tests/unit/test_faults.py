@@ -1,0 +1,123 @@
+"""Errors of a simulation that cannot go on: which particle they name, and why."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from sph import faults
+from sph.domain import Domain
+from sph.integrators.step_size import Bounds, StepLimit
+from sph.neighbours.order import BLOCK
+
+
+def state(n=4, dimension=2, boundary="open", external=None, **changed):
+    """A simulation at step 4 whose n particles have IDs from 11 on, the highest first."""
+    arrays = {
+        "id": np.arange(n)[::-1] + 11,
+        "position": np.arange(dimension * n).reshape(dimension, n) / 8.0,
+        "velocity": np.ones((dimension, n)),
+        "internal_energy": np.ones(n),
+        "energy_rate": np.ones(n),
+        "density": np.ones(n),
+    }
+    totals = SimpleNamespace(kinetic_energy=1.0, internal_energy=1.0, potential_energy=0.0)
+    box = np.array([[0.0, 2.0]] * dimension)
+    return SimpleNamespace(
+        step=4, steps_here=1, time=0.5, totals=totals,
+        particles=SimpleNamespace(**arrays | changed),
+        scene=SimpleNamespace(
+            external=external, domain=Domain(box, (boundary,) * dimension),
+            step_bounds=Bounds(0.1, True, False, 1.0),
+        ),
+    )  # fmt: skip
+
+
+def test_a_fault_says_when_what_and_what_to_try():
+    error = faults.fault(state(), "it broke", "another way", 7)
+    assert str(error) == "step 4, t = 0.5: it broke.\nTry: another way."
+    assert error.particle == 7
+
+
+def test_what_sets_a_step_is_its_particle_and_criterion():
+    words = {
+        "signal_speed": "by the speed of its signals",
+        "energy": "u/|du/dt|",
+        "acceleration": "acceleration",
+        "support": "support",
+        "viscosity": "physics.alpha",
+        "conductivity": "strength of physics.conductivity",
+        "approach": "approach",
+    }
+    assert set(words) == set(faults.SETS)
+    for criterion, expected in words.items():
+        said = faults.what_sets(StepLimit(0.1, 8, criterion))
+        assert said.startswith("particle 8 sets it by ")
+        assert expected in said
+        # no other criterion is told in these words
+        assert sum(expected in faults.what_sets(StepLimit(0.1, 8, one)) for one in words) == 1
+    assert "grow" in faults.what_sets(StepLimit(0.1, 0, "growth"))
+
+
+def test_bad_values_are_counted_by_particle_and_the_first_is_named():
+    velocity = np.array([[0.0, 1.0, np.nan, np.inf], [0.0, 2.0, np.nan, np.inf]])
+    simulation = state(velocity=velocity)
+    error = faults.fault_of(simulation, "velocity", velocity, ~np.isfinite(velocity), "-")
+    assert error.particle == 12
+    assert "velocity of particle 12 at (0.25, 0.75) is [nan nan]; 2 particle(s)" in str(error)
+    density = np.array([1.0, -2.0, 1.0, 1.0])
+    error = faults.fault_of(simulation, "density", density, density < 0.0, "-")
+    assert error.particle == 13
+    assert "density of particle 13 at (0.125, 0.625) is -2.0; 1 particle(s)" in str(error)
+
+
+def potential(position):
+    return -np.array([1.0, 3.0, 2.0, 1.0])
+
+
+@pytest.mark.parametrize(
+    ("total", "changed", "name", "particle"),
+    [
+        ("potential_energy", {}, "potential energy", 13),
+        # the fastest, though not along x
+        ("kinetic_energy", {"velocity": np.array([[1.0, 2.0, 0.0, 0.0], [0.0, 0.0, 0.0, -3.0]])},
+         "kinetic energy", 11),
+        ("internal_energy", {"internal_energy": np.array([1.0, 2.0, 5.0, 3.0])},
+         "internal energy", 12),
+        (None, {"energy_rate": np.array([1.0, 2.0, -5.0, 3.0])}, "rate of energy", 12),
+    ],
+)  # fmt: skip
+def test_a_sum_that_is_not_finite_is_told_with_the_particle_of_the_most(
+    total, changed, name, particle
+):
+    simulation = state(external=SimpleNamespace(potential=potential), **changed)
+    if total:
+        setattr(simulation.totals, total, np.inf)
+    error = faults.endless_sum(simulation)
+    assert error.particle == particle
+    assert f" of all {name} " in str(error)
+    assert f"particle {particle} at (" in str(error)
+    if total != "potential_energy":  # nor is it asked for where there is no field
+        simulation.scene.external = None
+        assert str(faults.endless_sum(simulation)) == str(error)
+
+
+def test_particles_without_neighbours_are_those_of_the_block():
+    simulation = state(n=BLOCK + 3)
+    error = faults.starved(simulation, 1)
+    assert error.particle == 13
+    assert "[13, 12, 11]" in str(error)
+
+
+@pytest.mark.parametrize(("boundary", "images"), [("open", 0), ("mirror", 1)])
+def test_particles_in_one_place_are_counted_with_their_images(boundary, images):
+    """The third of four particles is at the wall of x = 0, where its image is, and another's."""
+    position = np.array([[0.5, 0.0, 0.0, 0.5], [0.5, 0.25, 0.25, 0.75]])
+    density = np.array([1.0, 1.0, -1.0, 1.0])
+    crowd = state(boundary=boundary, position=position, density=density)
+    error = faults.crowded(crowd)
+    assert error.particle == 12
+    others = 1 + 2 * images
+    assert f"particle 12 at (0, 0.25): {others} other(s) in the same place" in str(error)
+    alone = state(boundary=boundary, density=density)
+    assert "alone it outweighs" in str(faults.crowded(alone))

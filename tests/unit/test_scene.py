@@ -1,0 +1,138 @@
+"""What a configuration compiles in: every property of a scene, where it holds and where not."""
+
+import math
+
+import numpy as np
+import pytest
+
+from sph import config as configuration
+from sph.passes.smoothing import Converged, FixedPasses
+from sph.passes.weighting import ByMass, ByNumber
+from sph.scene import Scene
+
+TEXT = '[problem]\nname = "uniform"\nn = 64\nboundary = "open"\n'
+FIELD = 'physics.external={ name = "point_mass", mass = 1.0 }'
+HEATING = 'physics.heating={ name = "relaxation", energy = 1.0, time = 0.1 }'
+RANGE = "physics.alpha={ min = 0.1, max = 2.0 }"
+SHOCKS = 'physics.alpha={ min = 0.1, max = 2.0, switch = "cullen_dehnen" }'
+CONTACTS = 'physics.conductivity={ name = "pressure_jump", switched = true }'
+STILL = "physics.balsara=false"
+LINE = "problem.dimension=1"
+
+
+def scene(*overrides):
+    return Scene(configuration.from_text(TEXT).override(overrides))
+
+
+@pytest.mark.parametrize(
+    ("name", "there", "absent"),
+    [
+        ("evolves_alpha", [[RANGE], [SHOCKS]], [[]]),
+        ("finds_shocks", [[SHOCKS]], [[], [RANGE]]),
+        ("conducts", [["physics.conductivity=approach"], [CONTACTS]], [[]]),
+        ("finds_contacts", [[CONTACTS]], [[], ["physics.conductivity=pressure_jump"]]),
+        ("sums_pressure", [["physics.scheme=pressure_energy"]], [[]]),
+        # heavy gas beside light, and a field: neither sends a signal that would bound the step
+        ("bounds_acceleration", [[FIELD], ["physics.density=number"]], [[], [HEATING]]),
+        ("needs_curl", [[]], [[STILL], [LINE]]),
+        ("needs_divergence", [[], [LINE], [STILL, RANGE]], [[STILL], [STILL, LINE]]),
+        ("is_filled", [["problem.boundary=mirror"], ["problem.boundary=periodic"]],
+         [[], ["problem.boundary=['periodic', 'open']"]]),
+    ],
+)  # fmt: skip
+def test_a_property_holds_where_something_asks_for_it(name, there, absent):
+    assert [getattr(scene(*overrides), name) for overrides in there] == [True] * len(there)
+    assert [getattr(scene(*overrides), name) for overrides in absent] == [False] * len(absent)
+
+
+def test_gas_that_does_not_fill_its_box_has_no_volume_to_be():
+    closed = configuration.from_text('[problem]\nname = "noh"\nn = 50\n')
+    assert set(closed.problem.boundaries) == {"mirror"}
+    assert not Scene(closed).is_filled
+
+
+@pytest.mark.parametrize(
+    ("overrides", "kept"),
+    [
+        ([], [1.0, 1.0]),
+        (["problem.boundary=['mirror', 'open']"], [0.0, 1.0]),
+        (["problem.boundary=['periodic', 'mirror']"], [1.0, 0.0]),
+        ([FIELD], [0.0, 0.0]),
+    ],
+)
+def test_momentum_is_kept_along_axes_without_walls_where_no_field_pulls(overrides, kept):
+    np.testing.assert_array_equal(scene(*overrides).keeps_momentum, kept)
+
+
+@pytest.mark.parametrize(
+    ("boundary", "expected"),
+    [("'open'", 6.0), ("['periodic', 'open']", math.inf), ("['open', 'mirror']", math.inf)],
+)
+def test_supports_are_held_where_every_axis_is_open(boundary, expected):
+    domain = "problem.domain=[[0.0, 1.0], [0.0, 2.0]]"
+    found = scene(domain, f"problem.boundary={boundary}", "physics.max_support=3.0")
+    assert found.max_support == found.models.max_support == expected
+
+
+def test_the_models_are_those_that_were_asked_for():
+    plain = scene().models
+    assert plain.smoothing == FixedPasses(2, 1e-10)
+    assert isinstance(plain.weighting, ByMass)  # both are equal to ()
+    assert plain.balsara is not None
+    assert plain.conductivity is None
+    other = scene("physics.density=number", "physics.density_passes=3", STILL).models
+    assert other.smoothing == FixedPasses(3, 1e-10)
+    assert isinstance(other.weighting, ByNumber)
+    assert other.balsara is None
+    for made in (scene(), scene("physics.density_passes='converged'")):
+        assert made.starting_models.smoothing == Converged(1e-10)
+    assert made.models is made.starting_models
+    assert plain._replace(smoothing=None) == scene().starting_models._replace(smoothing=None)
+
+
+PARTS = {
+    "equation for alpha": [RANGE],
+    "gradients of velocity": [SHOCKS],
+    "sum of the pressure": ["physics.scheme=pressure_energy"],
+    "artificial conductivity": ["physics.conductivity=approach"],
+    "switch of conductivity": [CONTACTS],
+    "external field": [FIELD],
+    "heating": [HEATING],
+    "Balsara factor": ["physics.balsara=true"],
+    "divergence of velocity": [RANGE],
+    "curl of velocity": ["physics.balsara=true"],
+    "time step limit u/|du/dt|": ["physics.energy_limit=true"],
+}
+NOTHING = [STILL, "physics.energy_limit=false"]
+
+
+@pytest.mark.parametrize("part", PARTS)
+def test_a_part_is_in_where_it_is_asked_for_and_else_left_out_with_a_reason(part):
+    inside, outside = scene(*NOTHING, *PARTS[part]).parts()
+    assert part in inside
+    assert not any(one.startswith(f"{part}: ") for one in outside)
+    inside, outside = scene(*NOTHING).parts()
+    assert part not in inside
+    (said,) = (one for one in outside if one.startswith(f"{part}: "))
+    assert said != f"{part}: "
+    assert len(outside) == len(PARTS)
+
+
+def test_what_every_scene_has_is_named():
+    inside, outside = scene("problem.boundary=periodic", "physics.density=number").parts()
+    assert inside[:6] == [
+        "2-D, 9 image(s) of the box",
+        "scheme grad_h, kernel wendland_c2",
+        "density by number",
+        "equation of state ideal_gas",
+        "2 density pass(es)",
+        "Balsara factor",
+    ]
+    inside, outside = scene(
+        LINE, "physics.kernel={ name = 'cubic_spline', flattened = true }",
+        "physics.eta=1.2", "physics.density_passes='converged'",
+    ).parts()  # fmt: skip
+    assert inside[0] == "1-D, 1 image(s) of the box"
+    assert "scheme grad_h, kernel cubic_spline, gradient flattened" in inside
+    assert "supports converged to 1e-10" in inside
+    assert "curl of velocity: no curl in 1-D" in outside

@@ -1,0 +1,223 @@
+"""Every bound of the watchdog from both sides, on a state made by hand."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from sph import watchdog
+from sph.errors import NumericalError
+from sph.integrators import step_size
+
+
+def quiet(**changed):
+    """What the watchdog looks at of gas at rest in a box of 1 by 2, open along y."""
+    n = 4
+    arrays = {
+        "id": np.array([14, 11, 13, 12]), "position": np.full((2, n), 0.5), "mass": np.ones(n),
+        "velocity": np.zeros((2, n)), "internal_energy": np.ones(n), "density": np.ones(n),
+        "acceleration": np.zeros((2, n)), "energy_rate": np.zeros(n),
+    } | changed  # fmt: skip
+    config = SimpleNamespace(
+        physics=SimpleNamespace(max_energy_drift=0.02, C=0.1), time=SimpleNamespace(end=0.25)
+    )
+    domain = SimpleNamespace(box=np.array([[0.0, 1.0], [0.0, 2.0]]), boundaries=("mirror", "open"))
+    totals = SimpleNamespace(
+        energy=1.0, kinetic_energy=0.0, internal_energy=1.0, potential_energy=0.0, max_density=1.0,
+        min_density=1.0, min_internal_energy=1.0, rates=0.0,
+    )  # fmt: skip
+    return SimpleNamespace(
+        scene=SimpleNamespace(
+            config=config, domain=domain, eos=None, external=None,
+            step_bounds=step_size.Bounds(0.1, False, False, 0.25),
+        ),
+        particles=SimpleNamespace(**arrays), totals=totals, energy_drift=0.0, volume_ratio=None,
+        limit=step_size.StepLimit(1e-3, 12, "signal_speed"), time=0.0, step=5,
+    )  # fmt: skip
+
+
+def refusal(state, check="check"):
+    """The error that the watchdog raises, or None."""
+    try:
+        getattr(watchdog.Watchdog(state.scene), check)(state)
+    except NumericalError as error:
+        return error
+    return None
+
+
+@pytest.mark.parametrize("check", ["check", "check_range"])
+def test_gas_at_rest_is_left_alone(check):
+    assert refusal(quiet(), check) is None
+
+
+@pytest.mark.parametrize(
+    ("name", "within", "beyond"),
+    [
+        ("mass", (1.1e-100, 0.9e100), (0.9e-100, 1.1e100, 0.0, -1.0, np.nan)),
+        ("position", (-0.9e100, 0.9e100), (-1.1e100, 1.1e100, np.nan)),
+        ("velocity", (-0.9e100, 0.9e100), (-1.1e100, 1.1e100, np.nan)),
+        ("internal_energy", (0.0, 0.9e100), (-1e-300, 1.1e100, np.nan)),
+    ],
+)
+def test_what_a_run_begins_with_has_cubes_and_inverses_that_are_numbers(name, within, beyond):
+    for value in (*within, *beyond):
+        state = quiet()
+        getattr(state.particles, name)[..., 2] = value
+        error = refusal(state, "check_range")
+        if value in within:
+            assert error is None
+            continue
+        assert error.particle == 13
+        assert str(error).startswith(f"step 5, t = 0: {name.replace('_', ' ')} of particle 13")
+
+
+@pytest.mark.parametrize(
+    ("size", "is_wrong"), [(0.9e-100, True), (1.1e-100, False), (0.9e100, False), (1.1e100, True)]
+)
+def test_boxes_and_ends_that_are_refused_by_their_size(size, is_wrong):
+    tall, late = quiet(), quiet()
+    tall.scene.domain.box = np.array([[0.0, 1.0], [0.0, size]])
+    late.scene.config.time.end = size
+    for state, words in ((tall, "long in y"), (late, "time.end")):
+        error = refusal(state, "check_range")
+        assert (error is not None) == is_wrong
+        assert error is None or words in str(error)
+
+
+@pytest.mark.parametrize("name", ["energy", "max_density", "rates"])
+@pytest.mark.parametrize("value", [np.nan, np.inf])
+def test_a_sum_that_is_not_finite_is_seen_though_every_particle_is(name, value):
+    state = quiet()
+    setattr(state.totals, name, value)
+    assert "sum of all" in str(refusal(state))
+
+
+@pytest.mark.parametrize("dt", [np.nan, np.inf, 0.0, -1.0])
+def test_a_step_that_does_not_move_time_is_seen(dt):
+    state = quiet()
+    state.limit = state.limit._replace(dt=dt)
+    assert refusal(state) is not None
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "is_wrong"),
+    [
+        ("internal_energy", -1e-300, True), ("internal_energy", 0.0, False),
+        ("density", 0.0, True), ("density", 1e-300, False),
+    ],
+)  # fmt: skip
+def test_energies_may_fall_to_nothing_and_densities_may_not(name, value, is_wrong):
+    state = quiet()
+    getattr(state.particles, name)[2] = value
+    setattr(state.totals, f"min_{name}", value)
+    error = refusal(state)
+    assert (error is not None) == is_wrong
+    assert error is None or error.particle == 13
+
+
+def test_what_a_run_begins_with_is_not_cured_by_smaller_steps():
+    state = quiet()
+    state.particles.density[2] = state.totals.min_density = 0.0
+    assert "physics.C" in str(refusal(state))
+    state.step = 0
+    assert "code units" in str(refusal(state))
+
+
+@pytest.mark.parametrize(("above", "is_torn"), [(1e-9, False), (0.0, True), (-1e-9, True)])
+def test_gas_is_torn_where_sound_has_no_speed(above, is_torn):
+    state = quiet(density=np.array([1.0, 1.0, 2.0, 1.0]))
+    state.scene.eos = SimpleNamespace(lowest_energy=lambda density: 0.25 * density)
+    state.particles.internal_energy[2] = 0.5 + above
+    error = refusal(state)
+    assert (error is not None) == is_torn
+    assert error is None or error.particle == 13
+
+
+@pytest.mark.parametrize(
+    ("changed", "particle"),
+    [
+        ({"mass": np.array([1.0, 1.0, 3.0, 1.0])}, 13),
+        # 3.5 of motion and 1 of heat, against 4
+        ({"velocity": np.array([[0.0, 2.0, 0.0, 0.0], [0.0, np.sqrt(3.0), 0.0, 0.0]]),
+          "internal_energy": np.array([4.0, 1.0, 1.0, 1.0])}, 11),
+        # 2 of motion and 1 of heat
+        ({"velocity": np.array([[0.0, 2.0, 0.0, 0.0], [0.0, 0.0, 0.0, 0.0]]),
+          "internal_energy": np.array([3.5, 1.0, 1.0, 1.0])}, 14),
+    ],
+)  # fmt: skip
+def test_a_drift_names_the_particle_with_the_most_energy(changed, particle):
+    state = quiet(**changed)
+    state.energy_drift = np.nan
+    assert refusal(state).particle == particle
+    state.energy_drift = -0.02
+    assert refusal(state) is None
+
+
+@pytest.mark.parametrize(
+    ("y", "is_lost"), [(-199.0, False), (-201.0, True), (201.0, False), (203.0, True)]
+)
+def test_a_lost_particle_is_a_hundred_lengths_away_on_either_side(y, is_lost):
+    state = quiet()
+    state.particles.position[:, 2] = 1e9, y  # along x there is a wall
+    state.particles.position[1, 0] = 200.0 if y < 0.0 else -199.0  # the farthest on the other side
+    error = refusal(state)
+    assert (error is not None) == is_lost
+    assert error is None or error.particle == 13
+
+
+@pytest.mark.parametrize(
+    ("covered", "words"),
+    [
+        ((1.0, 1.1e-6), None),
+        ((1.0, 0.9e-6), "collapsed"),
+        ((1.0, 0.9e-6, 1.0), "collapsed"),
+        ((1e-3, 1.0, 1e-3, 1.1e-6), None),
+        # of 0.25, all of which are left, and of 0.15
+        ((0.26e-12,), None),
+        ((0.24e-12,), "not come to its end"),
+        ((0.1, 0.16e-12), "collapsed"),
+    ],
+)
+def test_a_pace_that_leads_nowhere_is_told(covered, words):
+    def run():
+        state = quiet()
+        dog = watchdog.Watchdog(state.scene)
+        dog._check_pace(state)
+        for length in covered:
+            state.step, state.time = state.step + watchdog.WINDOW, state.time + length
+            dog._check_pace(state)
+
+    if words is None:
+        run()
+        return
+    with pytest.raises(NumericalError, match=words):
+        run()
+
+
+def test_what_is_left_is_counted_from_now():
+    """A pace of 0.2e-12 a window is too slow for 0.25 and not for the 0.15 that are left."""
+    dog, state = watchdog.Watchdog(quiet().scene), quiet()
+    state.time = 0.1
+    dog._check_pace(state)
+    state.step, state.time = state.step + watchdog.WINDOW, state.time + 0.2e-12
+    dog._check_pace(state)
+    late = quiet()
+    dog = watchdog.Watchdog(late.scene)
+    dog._check_pace(late)
+    late.step, late.time = late.step + watchdog.WINDOW, 0.2e-12
+    with pytest.raises(NumericalError, match="not come to its end"):
+        dog._check_pace(late)
+
+
+@pytest.mark.parametrize(("step", "is_looked_at"), [(1999, False), (2000, True)])
+def test_a_window_begins_where_the_last_one_ended(step, is_looked_at):
+    """A restart at step 1000: the first look is after a whole window."""
+    dog, state = watchdog.Watchdog(quiet().scene), quiet()
+    state.step = 1000
+    dog._check_pace(state)
+    state.step = step
+    if not is_looked_at:
+        dog._check_pace(state)
+        return
+    with pytest.raises(NumericalError, match="not come to its end"):
+        dog._check_pace(state)
