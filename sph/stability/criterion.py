@@ -13,6 +13,7 @@ from sph.errors import ConfigError, NumericalError, first_line
 from sph.output import checkpoint as checkpoints
 from sph.output.checkpoint import Checkpoint
 from sph.output.run_directory import RunDirectory
+from sph.problems.base import Limit
 
 NONE = float("nan")
 
@@ -92,7 +93,7 @@ class Judge:
         self.criterion = criterion
         self.drift = self._largest_drift()
         self.errors = self._largest_errors()
-        self.figures = self._largest_figures()
+        self.figures = self._limits_of_figures()
         self.report = {}
         if holds_report and not self.has_exact:
             self.report = self._numbers(self.summary)
@@ -117,10 +118,12 @@ class Judge:
             broken.append(f"the error of {field.replace('_', ' ')} is {error:.3g} of its limit")
         if not drift <= self.drift:
             broken.append(f"energy drifts by {drift:.2g}, more than {self.drift:.2g}")
-        for name, largest in self.figures.items():
+        for name, limit in self.figures.items():
             own = _figure(summary, name)
-            if not own <= largest:
-                broken.append(f"{name.replace('_', ' ')} is {own:.3g}, more than {largest:.3g}")
+            if not limit.holds(own):
+                side = "less" if limit.at_least else "more"
+                bound = f"{side} than {limit.bound:.3g}"
+                broken.append(f"{name.replace('_', ' ')} is {own:.3g}, {bound}")
         broken += self._other_figures(summary)
         verdict = "beyond" if broken else "stable"
         return Trial(
@@ -140,8 +143,9 @@ class Judge:
                 f"{what} within {self.criterion.deviation:.0%} of the run at C = {self._courant:g}"
             )
         figures = "".join(
-            f", {name.replace('_', ' ')} at most {largest:.3g}"
-            for name, largest in self.figures.items()
+            f", {name.replace('_', ' ')} at {'least' if limit.at_least else 'most'} "
+            f"{limit.bound:.3g}"
+            for name, limit in self.figures.items()
         )
         return f"it ends, {errors}, energy drift at most {self.drift:.2g}{figures}"
 
@@ -156,17 +160,19 @@ class Judge:
         own = float(self.summary["conservation"]["energy_drift_max"])
         return max(bound, self.criterion.error_growth * own)
 
-    def _largest_figures(self) -> dict[str, float]:
+    def _limits_of_figures(self) -> dict[str, Limit]:
         """The problem's other limits, or error_growth times what the reference has beyond one.
 
-        Without figures that the reference lacks, because it is too short for them.
+        Over error_growth where the figure must not fall below. Without figures that the reference
+        lacks, because it is too short for them.
         """
-        found = {}
+        found, growth = {}, self.criterion.error_growth
         for name, limit in self.state.config.problem.limits.items():
             own = _figure(self.summary, name)
-            if name != "energy_drift" and own == own:
-                keeps = own <= limit.bound
-                found[name] = limit.bound if keeps else self.criterion.error_growth * own
+            if name == "energy_drift" or own != own:
+                continue
+            beyond = own / growth if limit.at_least else own * growth
+            found[name] = limit if limit.holds(own) else limit._replace(bound=beyond)
         return found
 
     def _other_figures(self, summary: dict) -> list[str]:

@@ -144,7 +144,8 @@ def test_figures_keep_the_problems_limits_or_half_more_than_the_reference(ended)
         return Judge(run, Criterion(), holds_report=False)
 
     keeps, breaks = judge("keeps", 1.9), judge("breaks", 4.0)
-    assert (keeps.figures, breaks.figures) == ({"peak": 2.0}, {"peak": 6.0})
+    bounds = [{name: limit.bound for name, limit in one.figures.items()} for one in (keeps, breaks)]
+    assert bounds == [{"peak": 2.0}, {"peak": 6.0}]
     for one, value, verdict in (
         (keeps, 1.95, "stable"), (keeps, 2.1, "beyond"), (keeps, None, "beyond"),
         (breaks, 5.9, "stable"), (breaks, 6.1, "beyond"),
@@ -152,6 +153,19 @@ def test_figures_keep_the_problems_limits_or_half_more_than_the_reference(ended)
         run = ended(f"{value}", report={} if value is None else {"peak": value})
         assert one.trial(0.1, run).verdict == verdict
     assert "peak at most 2" in keeps.in_words()
+
+
+@pytest.mark.parametrize(("own", "least"), [(0.75, 0.6), (0.3, 0.2)])
+def test_a_figure_that_must_not_fall_has_a_lower_limit(ended, own, least):
+    """The growth of the smooth shear layer: 0.6 at least, or two thirds of the reference's."""
+    limits = {"growth": Limit(0.6, "-", at_least=True)}
+    run = ended("reference", State(limits), report={"growth": own})
+    judge = Judge(run, Criterion(), holds_report=False)
+    assert f"growth at least {least:g}" in judge.in_words()
+    for growth, words in ((1.01 * least, ""), (2.0, ""), (0.99 * least, f"less than {least:g}")):
+        trial = judge.trial(0.1, ended(f"{growth}", report={"growth": growth}))
+        assert trial.is_stable == (not words)
+        assert words in trial.reason
 
 
 @pytest.mark.parametrize("own", [2.0, -2.0])
