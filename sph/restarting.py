@@ -1,7 +1,6 @@
 """Go on from a checkpoint: what may change, where it goes on, and that it does bit for bit."""
 
 import dataclasses
-import json
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -152,11 +151,8 @@ def _is_last_without_summary(home: RunDirectory | None, path: Path, time: float)
     """Whether a run was killed after its last checkpoint, `path`, and before its summary."""
     if home is None or checkpoint_number(path) != checkpoint_number(home.checkpoints()[-1]):
         return False
-    try:
-        found = json.loads(home.summary.read_text(encoding="utf-8"))
-        return (found["status"], found["time"]) != ("done", time)
-    except (OSError, ValueError, LookupError, TypeError):
-        return True
+    found = home.read_summary()
+    return (found.get("status"), found.get("time")) != ("done", time)
 
 
 def _note_other_settings(home: RunDirectory, before: Config, config: Config, progress) -> None:
@@ -164,6 +160,8 @@ def _note_other_settings(home: RunDirectory, before: Config, config: Config, pro
 
     A user has edited it, or a restart with other settings was killed before its first checkpoint.
     """
+    if not home.config.is_file():  # a pipe would be waited for
+        return
     try:
         written = configuration.load(home.config)
     except SphError:

@@ -126,11 +126,7 @@ class RunDirectory:
     @property
     def has_failed(self) -> bool:
         """Whether the summary says so."""
-        try:
-            found = json.loads(read_text(self.summary))
-        except (OSError, FileError, ValueError, RecursionError):
-            return False
-        return isinstance(found, dict) and found.get("status") == "failed"
+        return self.read_summary().get("status") == "failed"
 
     def latest(self) -> Path:
         """The last checkpoint that is not damaged.
@@ -207,6 +203,14 @@ class RunDirectory:
         Raises FileError, and TypeError for what has no place in JSON.
         """
         write_text(self.summary, json_text(summary))
+
+    def read_summary(self) -> dict:
+        """What summary.json holds, or an empty dictionary where it cannot be read."""
+        try:
+            found = json.loads(read_text(self.summary))
+        except (OSError, FileError, ValueError, RecursionError):
+            return {}
+        return found if isinstance(found, dict) else {}
 
     @contextmanager
     def alone(self) -> Iterator[None]:
