@@ -239,6 +239,14 @@ def test_layers_keep_their_distance_across_diaphragm_and_transverse_faces():
     np.testing.assert_allclose(distance[bulk], np.sqrt(3.0) / 2.0 / 28.0, rtol=1e-9)
 
 
+@pytest.mark.parametrize("side", ["left", "right"])
+@pytest.mark.filterwarnings("error")
+def test_gases_too_different_in_density_for_n_are_refused(side):
+    thin = {"density": 1e-150, "velocity": 0.0, "pressure": 1.0}
+    with pytest.raises(ValidationError, match=r"n = 2000 is too small: a layer.* takes \d"):
+        ShockTube(**{**SOD_3D, "n": 2000, side: thin})
+
+
 def test_exact_tube_moves_with_its_diaphragm_and_is_the_riemann_solution():
     problem = ShockTube(dimension=2, n=200, discontinuity=0.1)
     position = np.array([[-0.4, 0.05, 0.2, 0.45], [0.0, 0.1, -0.1, 0.0]])
