@@ -17,7 +17,7 @@ from sph.integrators import step_size
 from sph.neighbours.search import Origin
 from sph.output import checkpoint as checkpoints
 from sph.output.checkpoint import Checkpoint
-from sph.output.files import copy_file
+from sph.output.files import copy_file, is_same_path
 from sph.output.history import History
 from sph.output.offenders import PART
 from sph.output.run_directory import RunDirectory, checkpoint_number, find
@@ -47,9 +47,7 @@ def restart(
     config = checkpoint.config.override(overrides)
     changed = restarts.changes(checkpoint.config, config)
     _check_changes(changed, config, checkpoint)
-    in_place = directory is None or (
-        home is not None and directory.resolve() == home.path.resolve()
-    )
+    in_place = directory is None or (home is not None and is_same_path(directory, home.path))
     is_closed = not (in_place and _is_last_without_summary(home, path, checkpoint.time))
     _check_steps_left(source, changed, config, checkpoint.time, is_closed)
     reference.check(config, directory or (home and home.path))
@@ -189,7 +187,7 @@ def _place_to_go_on(
     """The run directory to go on in, filled where it is a new one; the checkpoint's number."""
     if directory is None and home is None:
         raise FileError(f"{path} is not in a run directory.\nTry: -o DIR, to go on in a new one.")
-    if directory is None or (home is not None and directory.resolve() == home.path.resolve()):
+    if directory is None or (home is not None and is_same_path(directory, home.path)):
         return home, checkpoint_number(path)
     target = RunDirectory.create(directory)
     if home is None:

@@ -19,6 +19,7 @@ from sph.output.files import (
     Damaged,
     explained,
     holding,
+    is_same_path,
     is_unfinished,
     opened,
     read_text,
@@ -178,7 +179,7 @@ class RunDirectory:
                 before = checkpoint.read(numbers[other])
                 same_run.check_order(numbers[other], path, before, state)
                 break
-        stays = into is None or into.resolve() == self.path.resolve()
+        stays = into is None or is_same_path(into, self.path)
         for other in sorted(one for one in numbers if one > number and stays):
             with suppress(Damaged):
                 after = checkpoint.read(numbers[other])

@@ -128,6 +128,13 @@ def test_a_pipe_in_a_received_directory_is_not_waited_for(run, name):
     assert (run.path / name).is_file()
 
 
+def test_a_link_to_itself_is_no_run_directory(run, tmp_path):
+    (tmp_path / "loop").symlink_to("loop")
+    result = sph_("restart", run.path, "--set", "time.end=0.025", "-o", tmp_path / "loop")
+    assert result.exit_code == 4, result.output
+    assert "loop" in result.stderr
+
+
 def test_only_the_last_checkpoint_stands_for_a_missing_summary(run):
     """Of a run that was taken further, an earlier end is no reason to drop what came later."""
     ended = run.checkpoint_path(2).read_bytes()
