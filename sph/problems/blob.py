@@ -56,7 +56,7 @@ class Problem(base.Problem):
     )
     density_ratio: float = Field(default=10.0, gt=1, description="density of cloud over wind's")
     mach: float = Field(
-        default=2.7, ge=0.0, description="speed of the wind over its speed of sound"
+        default=2.7, gt=0.0, description="speed of the wind over its speed of sound"
     )
 
     @model_validator(mode="after")
