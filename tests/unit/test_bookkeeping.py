@@ -263,6 +263,26 @@ def test_a_run_shows_each_step_from_where_it_begins_to_its_end(closing, simulati
     assert closing.saved_step == 24
 
 
+def test_a_session_hears_nothing_from_numpy_and_says_where_threads_are_too_many(
+    tmp_path, monkeypatch
+):
+    monkeypatch.setattr(runner, "available_processors", lambda: 7)
+    notes = []
+    progress = SimpleNamespace(note=notes.append)
+    for number in (7, 8):
+        config = CONFIG.override([f"run.threads={number}"])
+        directory = RunDirectory.create(tmp_path / f"{number}")
+        with runner.session(directory, config, progress) as (stopped_by, clock):
+            assert set(np.geterr().values()) == {"ignore"}
+            assert stopped_by == []
+            clock.on_compilation()
+        assert clock.cpu >= 0.0
+    assert [note.partition(" ")[0] for note in notes] == ["compiling", "run.threads", "compiling"]
+    assert "may use 7 processor" in notes[1]
+    assert runner.threads_of(CONFIG.override(["run.threads=all"])) == 7
+    assert runner.threads_of(CONFIG.override(["run.threads=3"])) == 3
+
+
 # --- what it cost -----------------------------------------------------------------------------
 
 

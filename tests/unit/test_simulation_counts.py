@@ -159,6 +159,10 @@ def test_steps_and_time_go_on_from_a_checkpoint_and_steps_here_begin_anew(hollow
     one.advance(np.inf)
     one.advance(2.2)  # 0.075 of the 0.125 that are allowed
     assert (one.time, one.step, one.steps_here) == (2.2, 42, 2)
+    assert 0.001 + (0.0153 - 0.001) != 0.0153  # an output is met to the last bit
+    one.time = 0.001
+    one.advance(0.0153)
+    assert one.time == 0.0153
 
 
 def test_a_drift_is_measured_from_the_baseline_without_what_heating_added(hollow):

@@ -308,12 +308,12 @@ def test_the_front_may_be_given_in_any_order():
 
 
 def test_lines_are_in_the_order_of_their_numbers_and_runs_in_that_of_n(tmp_path):
-    for name, alpha, n in ((1, 10.0, 200), (2, 2.0, 400), (3, 10.0, 100), (4, 2.0, 90)):
+    for name, alpha, n in ((1, 10.0, 200), (2, 2.0, 400), (3, 10.0, 80), (4, 2.0, 90)):
         write_run(tmp_path / "s" / f"{name}", 1 / n, float(n),
                   [f"physics.alpha={alpha}", f"problem.n={n}"])  # fmt: skip
     report = compared(tmp_path / "s")
     assert [line.label for line in report.series] == ["alpha = 2.0", "alpha = 10.0"]
-    assert [row.n for row in report.rows] == [90, 400, 100, 200]
+    assert [row.n for row in report.rows] == [90, 400, 80, 200]
 
 
 def test_threads_change_no_result_and_what_failed_is_varied_too(tmp_path):
@@ -353,6 +353,23 @@ def test_errors_against_a_run_take_the_place_of_the_summarys(tmp_path):
         None,
     )
     assert row.figures()[0] == "velocity"
+
+
+def test_the_reference_is_not_compared_with_itself_nor_what_has_not_ended(study, monkeypatch):
+    write_run(study / "stopped", 0.1, 1.0, status="stopped")
+    fine, asked = study / "n=400,alpha=2.0", []
+
+    def errors_of(path, reference):
+        asked.append(path.name)
+        return {"reference": reference, "fields": {"density": {"L1": 0.5}}}
+
+    monkeypatch.setattr("sph.analysis.reference.Reference", str)
+    monkeypatch.setattr("sph.analysis.reference.errors_of", errors_of)
+    report = compared(study, reference=fine)
+    assert fine.name not in [row.name for row in (*report.rows, *report.without)]
+    assert len(asked) == len(report.rows) == 5
+    assert "stopped" not in asked
+    assert report.error.tolist() == [0.5] * 5
 
 
 def test_updates_of_a_restarted_run_are_those_of_all_its_steps(tmp_path):
