@@ -19,15 +19,16 @@ from sph.clock import Clock
 from sph.errors import NumericalError
 from sph.scene import Scene
 from sph.simulation import Simulation
-from sph.warnings import DRIFT
 
 CONFIGS = Path(__file__).parents[1] / "configs"
 PARTICLES = {1: 100, 2: 400, 3: 1000}
 COURANT = (0.15, 0.5, 1.0, 2.0)
 BOOSTS = (1e-3, 1.0, 1e3, 1e6)  # of the speed of sound
 DIRECTION = (1.0, 0.61, -0.37)
-# Chaos multiplies the rounding of a boosted step: drifts nearer to the bound than this are one.
-SAME = 1.3
+# Rounding of a boosted step, up to 1e-10 of the speed of sound, which chaos multiplies: drifts that
+# differ by less are one, and those below NOISE may be rounding alone.
+CHAOS = 0.3
+NOISE = 1e-7
 
 
 def main():
@@ -81,11 +82,10 @@ def drift(config, boost: float, steps: int) -> float:
 
 
 def same(still: float, moving: float) -> bool:
-    """Whether both stop, both warn, or both are sound."""
+    """Whether both stop, or energy drifts by the same but for what chaos makes of rounding."""
     if math.isinf(still) or math.isinf(moving):
         return still == moving
-    near = DRIFT / SAME < still < DRIFT * SAME and DRIFT / SAME < moving < DRIFT * SAME
-    return near or (still > DRIFT) == (moving > DRIFT)
+    return abs(moving - still) <= CHAOS * still or max(still, moving) < NOISE
 
 
 if __name__ == "__main__":

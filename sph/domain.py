@@ -47,7 +47,7 @@ class Domain:
     def largest_side(self) -> float:
         return float((self.box[:, 1] - self.box[:, 0]).max())
 
-    @property
+    @cached_property
     def volume(self) -> float:
         return float(np.prod(self.box[:, 1] - self.box[:, 0]))
 

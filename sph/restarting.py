@@ -1,7 +1,6 @@
 """Go on from a checkpoint: what may change, where it goes on, and that it does bit for bit."""
 
 import dataclasses
-import json
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -18,7 +17,7 @@ from sph.integrators import step_size
 from sph.neighbours.search import Origin
 from sph.output import checkpoint as checkpoints
 from sph.output.checkpoint import Checkpoint
-from sph.output.files import copy_file
+from sph.output.files import copy_file, is_same_path
 from sph.output.history import History
 from sph.output.offenders import PART
 from sph.output.run_directory import RunDirectory, checkpoint_number, find
@@ -48,9 +47,7 @@ def restart(
     config = checkpoint.config.override(overrides)
     changed = restarts.changes(checkpoint.config, config)
     _check_changes(changed, config, checkpoint)
-    in_place = directory is None or (
-        home is not None and directory.resolve() == home.path.resolve()
-    )
+    in_place = directory is None or (home is not None and is_same_path(directory, home.path))
     is_closed = not (in_place and _is_last_without_summary(home, path, checkpoint.time))
     _check_steps_left(source, changed, config, checkpoint.time, is_closed)
     reference.check(config, directory or (home and home.path))
@@ -152,11 +149,8 @@ def _is_last_without_summary(home: RunDirectory | None, path: Path, time: float)
     """Whether a run was killed after its last checkpoint, `path`, and before its summary."""
     if home is None or checkpoint_number(path) != checkpoint_number(home.checkpoints()[-1]):
         return False
-    try:
-        found = json.loads(home.summary.read_text(encoding="utf-8"))
-        return (found["status"], found["time"]) != ("done", time)
-    except (OSError, ValueError, LookupError, TypeError):
-        return True
+    found = home.read_summary()
+    return (found.get("status"), found.get("time")) != ("done", time)
 
 
 def _note_other_settings(home: RunDirectory, before: Config, config: Config, progress) -> None:
@@ -164,6 +158,8 @@ def _note_other_settings(home: RunDirectory, before: Config, config: Config, pro
 
     A user has edited it, or a restart with other settings was killed before its first checkpoint.
     """
+    if not home.config.is_file():  # a pipe would be waited for
+        return
     try:
         written = configuration.load(home.config)
     except SphError:
@@ -196,7 +192,7 @@ def _place_to_go_on(
     """The run directory to go on in, filled where it is a new one; the checkpoint's number."""
     if directory is None and home is None:
         raise FileError(f"{path} is not in a run directory.\nTry: -o DIR, to go on in a new one.")
-    if directory is None or (home is not None and directory.resolve() == home.path.resolve()):
+    if directory is None or (home is not None and is_same_path(directory, home.path)):
         return home, checkpoint_number(path)
     target = RunDirectory.create(directory)
     if home is None:

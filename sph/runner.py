@@ -3,7 +3,7 @@
 import itertools
 import math
 from collections.abc import Iterator
-from contextlib import closing, contextmanager
+from contextlib import closing, contextmanager, suppress
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +12,7 @@ from sph import faults
 from sph.analysis import reference, summary
 from sph.clock import Clock
 from sph.config import Config
-from sph.errors import NumericalError, Stopped
+from sph.errors import FileError, NumericalError, Stopped, first_line
 from sph.neighbours.search import Origin
 from sph.output import checkpoint as checkpoints
 from sph.output import offenders
@@ -182,8 +182,13 @@ class Runner:
     def _closing(self):
         try:
             yield
-        finally:
+        except BaseException:  # what ends the run is to be told, not what its end runs into
+            with suppress(FileError):
+                self.history.close()
+            raise
+        else:
             self.history.close()
+        finally:
             self.progress.close()
             self.simulation.close()
 
@@ -208,14 +213,17 @@ class Runner:
 
     def _failed(self, error: NumericalError) -> NumericalError:
         """The error with what else a user needs: the neighbourhood, and where to go on from."""
-        self._close("failed", reason=str(error))
-        last = self.directory.last_good()
         words = offenders.leave(self.directory.offenders, self._checkpoint(), error.particle)
-        return NumericalError(
-            f"{error}\n{words}The last good checkpoint is {last}: "
-            f"`sph restart {quoted(last)} --set …` goes on from there with other settings.",
-            error.particle,
-        )
+        try:
+            last = self.directory.last_good()
+            words += (
+                f"The last good checkpoint is {last}: "
+                f"`sph restart {quoted(last)} --set …` goes on from there with other settings."
+            )
+            self._close("failed", reason=str(error))
+        except FileError as full:  # the failure goes first, whatever the disk bears
+            words += f"\nThe end of the run could not be recorded: {first_line(str(full))}."
+        return NumericalError(f"{error}\n{words}", error.particle)
 
     def _stop(self, name: str) -> None:
         simulation = self.simulation

@@ -9,10 +9,12 @@ import numpy as np
 from sph import kernels, schemes
 from sph.config import Config
 from sph.domain import Domain
+from sph.errors import ConfigError
 from sph.integrators.step_size import Bounds
 from sph.passes import Models
 from sph.passes.smoothing import Converged, FixedPasses
 from sph.passes.weighting import ByMass, ByNumber
+from sph.problems.base import InitialState
 from sph.viscosity import balsara
 
 # Relative tolerance of the converged support: round-off of the density sum is some 1e-14.
@@ -142,6 +144,22 @@ class Scene:
             eta=float(physics.eta),
             max_support=self.max_support,
         )
+
+    def initial_state(self) -> InitialState:
+        """The problem's particles. Raises ConfigError for numbers too extreme to place any.
+
+        Problems square lengths and count lattice cells before there is a particle to check.
+        """
+        problem = self.config.problem
+        try:
+            with np.errstate(all="ignore"):
+                return problem.initial(self.eos)
+        except (ArithmeticError, ValueError) as error:
+            raise ConfigError(
+                f"problem.name = {problem.name}: particles cannot be placed with these settings "
+                f"({error}).\nTry: numbers in [problem] that are nearer to 1, and sides of "
+                "problem.domain of similar length."
+            ) from error
 
     def parts(self) -> tuple[list[str], list[str]]:
         """What is compiled in, and what was left out and why, in words."""

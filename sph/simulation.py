@@ -87,7 +87,7 @@ class Simulation:
     def of_problem(cls, scene: Scene, threads: int, clock: Clock) -> "Simulation":
         """The problem's initial state, of which nothing has been computed yet."""
         with clock.phase("initial state"):
-            initial = scene.config.problem.initial(scene.eos)
+            initial = scene.initial_state()
             alpha = float(scene.viscosity.start()) if scene.evolves_alpha else None
             particles = Particles.at_start(*initial, alpha=alpha)
         return cls(scene, particles, threads, clock)

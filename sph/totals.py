@@ -1,5 +1,6 @@
 """Sums and extremes over all particles: what the history records and the watchdog looks at."""
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -58,8 +59,9 @@ class Baseline(NamedTuple):
     def drift(self, totals: Totals, added: float) -> float:
         """Change of energy since the start, less what heating added, over the scale."""
         change = totals.energy_without_bulk - added - self.energy
-        with np.errstate(divide="ignore", invalid="ignore"):
-            return float(np.float64(change) / self.scale) if change else 0.0
+        if self.scale > 0.0:
+            return float(change / self.scale)
+        return math.copysign(math.inf, change) if change else 0.0
 
 
 def of(particles, external, keeps_momentum) -> Totals:

@@ -45,8 +45,13 @@ def of_run(simulation, summary: dict[str, Any]) -> list[Warning]:
 
 
 def kinds(summary: dict[str, Any]) -> list[str]:
-    """The kinds of warning in a summary, none twice; summaries of older versions have none."""
-    return list(dict.fromkeys(one["kind"] for one in summary.get("warnings", ())))
+    """The kinds of warning in a summary, none twice; summaries of older versions have none.
+
+    A summary that was read may be damaged: what is no warning there is left out.
+    """
+    found = summary.get("warnings")
+    warned = [one for one in found if isinstance(one, dict)] if isinstance(found, list) else []
+    return list(dict.fromkeys(str(one.get("kind")) for one in warned))
 
 
 def figure(summary: dict[str, Any], name: str) -> float | None:

@@ -13,6 +13,7 @@ from sph.domain import Domain
 from sph.errors import ConfigError
 from sph.output import checkpoint
 from sph.output.checkpoint import Checkpoint
+from sph.output.files import is_same_path
 from sph.output.run_directory import RunDirectory
 
 # Times closer than this, relative to the later one, are one: runs land on their outputs.
@@ -61,7 +62,7 @@ def check(config: Config, target: Path | None) -> None:
     if not config.report.reference:
         return
     path = Path(config.report.reference)
-    if target is not None and path.resolve() == Path(target).resolve():
+    if target is not None and is_same_path(path, target):
         raise ConfigError(
             f"report.reference = {path}: this is the directory that the run itself is to go to.\n"
             "Try: another directory for the run, with -o."

@@ -158,6 +158,11 @@ def resolve(
             details = _details(error, problem is not None, bool(spoilt))
             elsewhere = _tables_of_keys(models, besides=name)
             issues += explain(model, raw[name], details, name, elsewhere)
+        except ArithmeticError as error:  # in a check across keys, such as a count of lattice cells
+            text = (
+                f": {error}; expected numbers nearer to 1, and a domain with sides of like length"
+            )
+            issues.append(Issue((name,), text))
     issues += checks.gas_issues(found)
     issues += checks.external_issues(found)
     if not recorded:

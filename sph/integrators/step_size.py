@@ -73,7 +73,7 @@ class Bounds(NamedTuple):
     def held(self) -> tuple[float, str]:
         """The Courant number that the run takes, C or less, and the criterion of its signals."""
         held, criterion = self.courant, "signal_speed"
-        stable = 1.0 / (self.alpha + math.sqrt(4.0 + self.alpha**2))  # 2 alpha C + 4 C^2 = 1
+        stable = 1.0 / (self.alpha + math.hypot(2.0, self.alpha))  # 2 alpha C + 4 C^2 = 1
         if stable < held:
             held, criterion = stable, "viscosity" if self.alpha > 2.0 * stable else criterion
         if self.conductivity * held > CONDUCTIVITY:

@@ -251,6 +251,11 @@ def check_in_place(path: Path, descriptor: int) -> None:
     )
 
 
+def is_same_path(one: Path, other: Path) -> bool:
+    """Whether both lead to the same place, there or not. A link to itself is no error."""
+    return os.path.realpath(one) == os.path.realpath(other)
+
+
 def refuse_link(directory: Path) -> None:
     """Raise FileError where `directory` is a link, through which a run would write elsewhere."""
     if directory.is_symlink():

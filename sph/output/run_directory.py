@@ -19,6 +19,7 @@ from sph.output.files import (
     Damaged,
     explained,
     holding,
+    is_same_path,
     is_unfinished,
     opened,
     read_text,
@@ -126,11 +127,7 @@ class RunDirectory:
     @property
     def has_failed(self) -> bool:
         """Whether the summary says so."""
-        try:
-            found = json.loads(read_text(self.summary))
-        except (OSError, FileError, ValueError, RecursionError):
-            return False
-        return isinstance(found, dict) and found.get("status") == "failed"
+        return self.read_summary().get("status") == "failed"
 
     def latest(self) -> Path:
         """The last checkpoint that is not damaged.
@@ -182,7 +179,7 @@ class RunDirectory:
                 before = checkpoint.read(numbers[other])
                 same_run.check_order(numbers[other], path, before, state)
                 break
-        stays = into is None or into.resolve() == self.path.resolve()
+        stays = into is None or is_same_path(into, self.path)
         for other in sorted(one for one in numbers if one > number and stays):
             with suppress(Damaged):
                 after = checkpoint.read(numbers[other])
@@ -207,6 +204,14 @@ class RunDirectory:
         Raises FileError, and TypeError for what has no place in JSON.
         """
         write_text(self.summary, json_text(summary))
+
+    def read_summary(self) -> dict:
+        """What summary.json holds, or an empty dictionary where it cannot be read."""
+        try:
+            found = json.loads(read_text(self.summary))
+        except (OSError, FileError, ValueError, RecursionError):
+            return {}
+        return found if isinstance(found, dict) else {}
 
     @contextmanager
     def alone(self) -> Iterator[None]:

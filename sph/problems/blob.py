@@ -54,9 +54,11 @@ class Problem(base.Problem):
     radius: float = Field(
         default=1.0, gt=0.0, description="radius of the cloud, whose centre is half a width from lo"
     )
-    density_ratio: float = Field(default=10.0, gt=1, description="density of cloud over wind's")
+    density_ratio: float = Field(
+        default=10.0, gt=1, le=1e6, description="density of cloud over wind's"
+    )
     mach: float = Field(
-        default=2.7, ge=0.0, description="speed of the wind over its speed of sound"
+        default=2.7, gt=0.0, description="speed of the wind over its speed of sound"
     )
 
     @model_validator(mode="after")

@@ -293,10 +293,13 @@ class Problem(base.Problem):
 
 
 def _of_one_and_other(share: np.ndarray, n: int) -> np.ndarray:
-    """(candidates, 2): whole numbers of layers of one side, with either neighbour for the other."""
+    """(candidates, 2): whole numbers of layers of one side, with either neighbour for the other.
+
+    As float64: between gases of very different densities they exceed the range of integers.
+    """
     ideal = int(share[0] * n)
-    one = np.arange(max(1, ideal - REACH), ideal + REACH + 1)
-    other = np.maximum(1, (one * share[1] / share[0]).astype(int))
+    one = np.arange(max(1, ideal - REACH), ideal + REACH + 1.0)
+    other = np.maximum(1.0, np.trunc(one * share[1] / share[0]))
     return np.vstack([np.stack([one, other], axis=1), np.stack([one, other + 1], axis=1)])
 
 
@@ -314,6 +317,6 @@ def _whole_layers(held: np.ndarray, per_layer: np.ndarray, n: int) -> np.ndarray
     if away[best] > n / 2:
         raise ValueError(
             f"n = {n} is too small: a layer of either gas in particles of equal share takes "
-            f"{particles[best]}"
+            f"{particles[best]:.15g}"
         )
-    return layers[best]
+    return layers[best].astype(int)

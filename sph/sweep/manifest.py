@@ -15,8 +15,15 @@ from pathlib import Path
 from sph import config as configuration
 from sph.config import Config, reading
 from sph.config.toml_text import key_text, value_text
-from sph.errors import ConfigError, FileError
-from sph.output.files import explained, is_unfinished, read_text, refuse_link, write_text
+from sph.errors import ConfigError, FileError, first_line
+from sph.output.files import (
+    explained,
+    is_unfinished,
+    opened,
+    read_text,
+    refuse_link,
+    write_text,
+)
 from sph.output.run_directory import RunDirectory
 from sph.sweep.plan import Plan, Point
 from sph.version import __version__
@@ -50,7 +57,7 @@ class SweepDirectory:
     def plan(self) -> Plan:
         """The plan in sweep.toml. Raises FileError where there is none that can be read."""
         try:
-            found = tomllib.loads(self.manifest.read_text(encoding="utf-8"))
+            found = tomllib.loads(read_text(self.manifest))
             points = tuple(Point(name, _texts(one)) for name, one in found["points"].items())
             varied = {key: list(_texts(values)) for key, values in found["vary"].items()}
             return Plan(_texts(found["set"]), varied, points)
@@ -93,6 +100,8 @@ class SweepDirectory:
                 f"{self.path} holds a sweep over {', '.join(before.varied) or 'nothing'}, not over "
                 f"{', '.join(plan.varied) or 'nothing'}.\n{OTHER_DIRECTORY}"
             )
+        if self.base.exists() and not self.base.is_file():  # a pipe would be waited for
+            raise FileError(f"{self.base} is not a regular file.\n{OTHER_DIRECTORY}")
         for point in plan.points:
             try:
                 overrides = (*before.overrides, *point.settings)
@@ -130,9 +139,12 @@ class SweepDirectory:
 def reason_in(path: Path) -> str:
     """What a `.failed` file says, whatever it holds."""
     try:
-        return path.read_text(encoding="utf-8", errors="replace").strip() or "no reason was kept"
+        with opened(path) as file:
+            return file.readall().decode(errors="replace").strip() or "no reason was kept"
     except OSError as error:
         return f"the reason cannot be read: {error.strerror}"
+    except FileError as error:
+        return f"the reason cannot be read: {first_line(str(error))}"
 
 
 def has_checkpoints(run: RunDirectory) -> bool:

@@ -6,7 +6,6 @@ So an orphan of a sweep that was killed goes on unharmed, and nobody else touche
 """
 
 import fcntl
-import json
 import re
 import shlex
 import subprocess
@@ -64,7 +63,7 @@ class Task:
     @property
     def status(self) -> str | None:
         """The status in summary.json, or None while there is none."""
-        return _summary(self.run).get("status")
+        return self.run.read_summary().get("status")
 
     def command(self) -> list[str]:
         """What does the rest of this point: go on from the last good checkpoint, or run anew."""
@@ -117,7 +116,7 @@ def standing(task: Task) -> Outcome:
 
 
 def _done(task: Task, how: str = "") -> Outcome:
-    warned = tuple(warnings.kinds(_summary(task.run)))
+    warned = tuple(warnings.kinds(task.run.read_summary()))
     return Outcome(task.point.name, "done", how=how, warnings=warned)
 
 
@@ -162,7 +161,7 @@ def _wait(child: subprocess.Popen, stops: Callable[[], int]) -> int:
 def _reason(task: Task, code: int, begin: int) -> str:
     """Why an attempt failed: in the summary's words, or the last that the run said."""
     if code == NumericalError.exit_code and task.status == "failed":
-        return str(_summary(task.run).get("reason"))
+        return str(task.run.read_summary().get("reason"))
     said = task.log.read_bytes()[begin:].decode(errors="replace").strip()
     message = re.search(r"^sph: (.*)", said, re.MULTILINE | re.DOTALL)
     last = said.splitlines()[-1] if said else "it said nothing"
@@ -183,15 +182,6 @@ def _locked(path: Path, stops: Callable[[], int]) -> Iterator[BinaryIO]:
         if stops():
             raise Stopped("it was not begun")
         yield file
-
-
-def _summary(run: RunDirectory) -> dict:
-    """summary.json, or an empty one where there is none."""
-    try:
-        found = json.loads(run.summary.read_text(encoding="utf-8"))
-    except (OSError, ValueError):
-        return {}
-    return found if isinstance(found, dict) else {}
 
 
 def _can_go_on(run: RunDirectory) -> bool:

@@ -163,6 +163,11 @@ def test_contrast_reports_what_moves():
 # --- blob -------------------------------------------------------------------------------------
 
 
+def test_a_cloud_without_a_wind_is_refused():
+    with pytest.raises(ValidationError, match="mach"):  # growth times are counted in its speed
+        Blob(mach=0.0)
+
+
 @pytest.mark.parametrize(("dimension", "n"), [(2, 4000), (3, 20000)])
 def test_cloud_is_dense_cold_and_at_rest_in_its_wind(dimension, n):
     problem = Blob(dimension=dimension, n=n)

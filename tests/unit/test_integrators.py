@@ -203,6 +203,7 @@ def test_the_leapfrog_is_stable_as_far_as_the_formula_says(damping):
         (0.15, 8.0, 0.0615528, "viscosity"),
         (2.0, 1.0, 0.3090170, "viscosity"),
         (2.0, 0.5, 0.3903882, "signal_speed"),  # of sound, more than of viscosity
+        (0.15, 1e200, 5e-201, "viscosity"),  # whose square is beyond the largest number
     ],
 )
 def test_damping_holds_the_courant_number(C, alpha, held, criterion):

@@ -10,6 +10,8 @@ from pydantic import ValidationError
 from scipy.spatial import cKDTree
 
 from sph import eos, lattice, registry
+from sph.config import from_text
+from sph.errors import ConfigError
 from sph.exact import riemann, sedov
 from sph.problems.kelvin_helmholtz import Problem as KelvinHelmholtz
 from sph.problems.kelvin_helmholtz_smooth import Problem as SmoothKelvinHelmholtz
@@ -237,6 +239,26 @@ def test_layers_keep_their_distance_across_diaphragm_and_transverse_faces():
     assert distance.min() > 0.5 * (1 / 112 + 1 / 56)
     bulk = (state.position[0] > 0.1) & (state.position[0] < 0.9)
     np.testing.assert_allclose(distance[bulk], np.sqrt(3.0) / 2.0 / 28.0, rtol=1e-9)
+
+
+def test_a_domain_whose_cells_cannot_be_counted_is_refused():
+    domain = "[[-1e-160, 1e-160], [-0.25, 0.25], [-0.25, 0.25]]"
+    text = f'[problem]\nname = "shock_tube"\ndimension = 3\ndomain = {domain}\n'
+    with pytest.raises(ConfigError, match=r"problem: .* expected numbers nearer to 1"):
+        from_text(text)
+
+
+def test_walls_part_from_gas_whose_pressure_is_too_low_to_compute_with():
+    assert Uniform(pressure=1e-300).fills_box(AIR) is False
+    assert Uniform(pressure=1.0).fills_box(AIR) is True
+
+
+@pytest.mark.parametrize("side", ["left", "right"])
+@pytest.mark.filterwarnings("error")
+def test_gases_too_different_in_density_for_n_are_refused(side):
+    thin = {"density": 1e-150, "velocity": 0.0, "pressure": 1.0}
+    with pytest.raises(ValidationError, match=r"n = 2000 is too small: a layer.* takes \d"):
+        ShockTube(**{**SOD_3D, "n": 2000, side: thin})
 
 
 def test_exact_tube_moves_with_its_diaphragm_and_is_the_riemann_solution():

@@ -2,6 +2,7 @@
 
 import hashlib
 import json
+import os
 import shutil
 from types import SimpleNamespace
 
@@ -111,6 +112,30 @@ def test_a_run_killed_before_its_summary_gets_it(run):
     for key in ("status", "time", "steps", "errors", "conservation", "settings_changed"):
         assert after[key] == before[key]
     assert files(run.path / "checkpoints") == kept
+
+
+@pytest.mark.parametrize("text", ["[" * 100_000, "[]", '{"status": ["done"]}', "\xff"])
+def test_a_summary_that_is_damaged_is_written_anew(run, text):
+    run.summary.write_text(text, encoding="latin-1")
+    result = sph_("restart", run.path)
+    assert result.exit_code == 0, result.output
+    assert json.loads(run.summary.read_text())["status"] == "done"
+
+
+@pytest.mark.parametrize("name", ["config.toml", "summary.json"])
+def test_a_pipe_in_a_received_directory_is_not_waited_for(run, name):
+    (run.path / name).unlink()
+    os.mkfifo(run.path / name)
+    result = sph_("restart", run.path, "--set", "time.end=0.025")
+    assert result.exit_code == 0, result.output
+    assert (run.path / name).is_file()
+
+
+def test_a_link_to_itself_is_no_run_directory(run, tmp_path):
+    (tmp_path / "loop").symlink_to("loop")
+    result = sph_("restart", run.path, "--set", "time.end=0.025", "-o", tmp_path / "loop")
+    assert result.exit_code == 4, result.output
+    assert "loop" in result.stderr
 
 
 def test_only_the_last_checkpoint_stands_for_a_missing_summary(run):

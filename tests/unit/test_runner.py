@@ -17,6 +17,7 @@ from sph import restarting, runner
 from sph.analysis.summary import in_words
 from sph.errors import ConfigError, FileError, NumericalError, Stopped
 from sph.output import checkpoint as checkpoints
+from sph.output.history import History
 from sph.output.run_directory import RunDirectory, find
 from sph.runner import output_times
 
@@ -670,6 +671,29 @@ def test_a_numerical_failure_names_the_particle_and_the_way_on(tmp_path, recwarn
     assert json.loads(run.summary.read_text())["status"] == "done"
     assert not run.offenders.exists()
     assert numbers(run) == [f"checkpoint_{k:06d}.h5" for k in range(3)]
+
+
+def test_a_failure_on_a_full_disk_is_told_with_its_offenders(tmp_path, monkeypatch):
+    """Exit code 3 and what broke, although neither history nor summary can be written any more."""
+    run = RunDirectory.create(tmp_path / "run")
+    flush, checkpoints_written = History.flush, []
+
+    def full_after_the_first_checkpoint(history):
+        if checkpoints_written:
+            raise FileError("cannot write history.csv: No space left on device.\nTry: elsewhere.")
+        checkpoints_written.append(1)
+        flush(history)
+
+    monkeypatch.setattr(History, "flush", full_after_the_first_checkpoint)
+    with pytest.raises(NumericalError, match="total energy has drifted") as caught:
+        runner.run(configuration.from_text(STRONG), run, Watch())
+    assert caught.value.exit_code == 3
+    assert checkpoints.read(run.offenders).particles.id[0] == caught.value.particle
+    assert f"sph restart {run.checkpoint_path(0)} --set" in str(caught.value)
+    last = str(caught.value).splitlines()[-1]
+    assert last.endswith(
+        "could not be recorded: cannot write history.csv: No space left on device."
+    )
 
 
 def test_the_first_step_of_a_restart_obeys_what_was_changed(tube, tmp_path):

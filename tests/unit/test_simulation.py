@@ -203,8 +203,8 @@ def test_a_bad_particle_is_named(begin, name, value):
 
 
 def test_a_support_that_does_not_fit_the_box_is_refused_at_the_start(begin):
-    with pytest.raises(NumericalError, match=r"particle \d+ needs a kernel support of .*wider"):
-        begin(TUBE, "problem.boundary=periodic", "physics.eta=60.0")
+    with pytest.raises(NumericalError, match=r"particle \d+ needs a kernel support of .* times"):
+        begin(TUBE, "problem.boundary=periodic", "physics.eta=5e4")
 
 
 def test_what_both_halves_of_a_step_inject_is_counted(begin, monkeypatch):

@@ -24,17 +24,20 @@ noise = 0.2
 [physics]
 eta = 0.8
 """,
-    # twice the largest stable step; the energy limit would shorten it
+    # cold streams that meet in steps which resolve the heating of neither; energy_limit would
     "energy_drift": """
 [problem]
-name = "shock_tube"
-n = 60
+name = "noh"
+n = 100
 [physics]
-C = 0.6
+alpha = 2.0
+C = 0.3
 energy_limit = false
 max_energy_drift = 1.0
 [time]
-end = 0.1
+end = 0.3
+[output]
+interval = 0.3
 """,
     # open on all sides, with supports that are to stay as narrow as the ball
     "held_supports": """

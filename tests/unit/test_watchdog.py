@@ -11,8 +11,9 @@ import pytest
 
 from sph import config as configuration
 from sph import faults, watchdog
-from sph.errors import NumericalError
+from sph.errors import ConfigError, NumericalError
 from sph.integrators import leapfrog, step_size
+from sph.scene import Scene
 
 TUBE = """
 [problem]
@@ -450,6 +451,22 @@ end = 0.1
 def test_what_no_sum_can_hold_is_named_before_the_first(begin, override, words):
     with pytest.raises(NumericalError, match=words + r"[\s\S]*Try: code units"):
         begin(override, text=CLOUD)
+
+
+@pytest.mark.parametrize(
+    ("problem", "settings"),
+    [
+        ("noh", 'domain = [0.0, 1e300]\nboundary = "mirror"'),  # its square overflows
+        ("uniform", "domain = [0.0, 5e-324]"),  # so do its cells
+        ("uniform", "dimension = 2\ndomain = [[0.0, 1e-150], [0.0, 1.0]]"),
+        ("blob", "density_ratio = 1e300"),
+    ],
+)
+@pytest.mark.filterwarnings("error")
+def test_numbers_too_extreme_to_place_particles_are_refused(problem, settings):
+    config = configuration.from_text(f'[problem]\nname = "{problem}"\nn = 100\n{settings}\n')
+    with pytest.raises(ConfigError, match=f"{problem}: particles cannot be placed[\\s\\S]*Try: "):
+        Scene(config).initial_state()
 
 
 def test_a_particle_on_an_unsoftened_mass_is_named(begin):

@@ -12,6 +12,8 @@ ENERGIES = (
     ("internal_energy", "internal", style.PALETTE[1], "--"),
     ("kinetic_energy", "kinetic", style.PALETTE[0], "-."),
 )
+LABELS = {"volume_ratio": r"$\sum m/\rho$ over the volume"}
+DECADE = 10.0  # a column that spans more is drawn on a logarithmic axis
 STYLES = ("-", "--", "-.")
 LIMITERS = dict(zip(CRITERIA, (*style.PALETTE, "#999999", "#882255", "black"), strict=True))
 
@@ -59,9 +61,8 @@ def _energies(panel, history) -> None:
 
 
 def _drift(panel, history) -> None:
-    energy = history["total_energy"]
-    panel.plot(history["t"], energy / energy[0] - 1.0, color=style.PALETTE[0])
-    panel.set_ylabel(r"$(E - E_0)\,/\,E_0$")
+    panel.plot(history["t"], history["energy_drift"], color=style.PALETTE[0])
+    panel.set_ylabel("energy drift")
 
 
 def _momentum(panel, history, names) -> None:
@@ -94,6 +95,6 @@ def _diagnostic(panel, history, name: str, theory: np.ndarray | None) -> None:
     if theory is not None:
         panel.plot(history["t"], theory, "--", color="black", label="theory")
         panel.legend(loc="best")
-    panel.set_ylabel(name.replace("_", " "))
-    if np.all(values > 0.0) and np.ptp(values) > 0.0:
+    panel.set_ylabel(LABELS.get(name, name.replace("_", " ")))
+    if np.all(values > 0.0) and values.max() > DECADE * values.min():
         panel.set_yscale("log")

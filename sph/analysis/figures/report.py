@@ -151,6 +151,8 @@ def _lines(panel, report: Report, lines: Sequence[Series], x: np.ndarray, note) 
             x[warned], report.error[warned], marker, ms=5, mew=1.2, mfc="white",
             color=colours[line.group], zorder=4,
         )  # fmt: skip
+    if any(row.warnings for row in report.rows):
+        panel.plot([], [], "o", ms=5, mew=1.2, mfc="white", color=GUIDE, label="with warnings")
 
 
 def _front(panel, report: Report) -> None:

@@ -1,6 +1,7 @@
 """Run directories as rows of a table: their settings, errors and costs."""
 
 import json
+import os
 import re
 import tomllib
 from collections.abc import Sequence
@@ -185,7 +186,7 @@ def _never_begun(sweep: SweepDirectory) -> dict[Path, Row]:
     failures = sweep.failures()
     rows = {}
     for point in sweep.plan().points:
-        path = (sweep.path / point.name).resolve()
+        path = Path(os.path.realpath(sweep.path / point.name))  # a link to itself is no error
         if not _is_run(path):
             reason = failures.get(point.name)
             status = "unfinished" if reason is None else "failed"

@@ -359,8 +359,8 @@ def test_gas_that_left_an_open_domain_is_on_the_map():
 
 def test_history_shows_drift_limiter_and_diagnostics(shear):
     found = read_history(shear.history)
-    found["mode_amplitude"] = np.array([0.1, 0.3])
-    found["total_energy"] = np.array([2.0, 2.5])
+    found["mode_amplitude"] = np.array([0.1, 1.3])
+    found["energy_drift"] = np.array([0.0, 0.25])
     found["limiter"] = np.array(["signal_speed", "energy"], dtype=object)
     energies, drift, momentum, steps, mode = history.figure(found, "a run").axes
     assert len(energies.get_lines()) == 3

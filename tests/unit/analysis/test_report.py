@@ -259,6 +259,7 @@ def test_points_of_a_sweep_without_a_run_are_listed(tmp_path):
     sweep.prepare(base, Plan.of(["problem.n=100,200,300"]))
     write_run(tmp_path / "sweep" / "problem.n=100", 0.1, 1.0, ["problem.n=100"])
     (sweep.logs / "problem.n=200.failed").write_text("the disk is full\n")
+    (tmp_path / "sweep" / "problem.n=300").symlink_to("problem.n=300")  # to itself
     text = said(compared(tmp_path / "sweep"))
     assert "problem.n=200 (failed: the disk is full)" in text
     assert "problem.n=300 (unfinished: it was not begun)" in text

@@ -164,12 +164,12 @@ def test_a_reference_that_fails_exits_with_3(tube, tmp_path):
 
 
 def test_a_run_that_is_refused_is_a_verdict_with_its_reason(searched, tube):
-    """At eta = 40 a support is 80 spacings wide, twice the box."""
+    """At eta = 5e4 a support takes more than a thousand images of the box."""
     _, target = searched
     trials = Trials(tube, "physics.eta", (), target, Criterion(), 1)
-    assert trials.are_stable([40.0]) == [False]
-    assert trials.done[40.0].verdict == "failed"
-    assert "wider than" in trials.done[40.0].reason
+    assert trials.are_stable([5e4]) == [False]
+    assert trials.done[5e4].verdict == "failed"
+    assert "times the shortest side of the box" in trials.done[5e4].reason
 
 
 def test_without_an_exact_solution_runs_are_held_to_the_reference(tmp_path):

@@ -1,5 +1,7 @@
 """The directory of a sweep: made once, extended, and refused where it is of something else."""
 
+import os
+
 import h5py
 import pytest
 
@@ -119,16 +121,39 @@ def test_a_reason_that_is_not_text_is_told_as_far_as_it_is(config, sweep):
     plan = of("problem.n=50,60,70,80")
     sweep.prepare(config, plan)
     names = [point.name for point in plan.points]
+    os.mkfifo(sweep.logs / f"{names[3]}.failed")
     (sweep.logs / f"{names[0]}.failed").write_bytes(b"no\xff text\n")
     (sweep.logs / f"{names[1]}.failed").touch()
     (sweep.logs / f"{names[2]}.failed").mkdir()
     found = sweep.failures()
     assert found[names[0]] == "no\ufffd text"
     assert found[names[1]] == "no reason was kept"
-    assert found[names[2]] == "the reason cannot be read: Is a directory"
+    assert found[names[2]].startswith("the reason cannot be read: ")
+    assert found[names[3]].startswith("the reason cannot be read: ")
     standings = [standing(task) for task in tasks(sweep, plan)]
     assert [one.status for one in standings] == ["failed", "failed", "stopped", "stopped"]
     assert standings[0].reason == found[names[0]]
+
+
+def test_a_pipe_in_a_received_sweep_is_not_waited_for(config, sweep):
+    sweep.prepare(config, of("problem.n=50"))
+    sweep.base.unlink()
+    os.mkfifo(sweep.base)
+    with pytest.raises(FileError, match=r"base.toml is not a regular file.\nTry: "):
+        sweep.prepare(config, of("problem.n=50"))
+
+
+@pytest.mark.parametrize(
+    "text", ["[" * 100_000, "[]", '{"status": "done", "warnings": 5}', '{"warnings": [1, {}]}']
+)
+def test_a_point_with_a_damaged_summary_has_a_standing(config, sweep, text):
+    plan = of("problem.n=50")
+    sweep.prepare(config, plan)
+    (task,) = tasks(sweep, plan)
+    task.run.path.mkdir()
+    task.run.summary.write_text(text)
+    assert standing(task).status == ("done" if "done" in text else "stopped")
+    assert standing(task).warnings == ()
 
 
 @pytest.mark.parametrize("has_base", [False, True])

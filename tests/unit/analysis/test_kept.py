@@ -85,26 +85,9 @@ def test_axes_that_do_not_keep_momentum_are_left_out():
 
 @pytest.mark.parametrize(
     ("ratio", "last", "worst"),
-    [
-        ([1.0, 0.8, 1.1, 0.99], 0.99, 0.8),
-        ([1.0, 0.9, 1.3, 1.01], 1.01, 1.3),
-        ([1.0, 0.8, 1.22, 1.01], 1.01, 0.8),  # as a factor: 1/1.25
-    ],
+    [([1.0, 0.8, 1.1, 0.99], 0.99, 0.8), ([1.0, 0.9, 1.3, 1.01], 1.01, 1.3)],
 )
 def test_volume_ratio_is_the_last_and_that_farthest_from_one(ratio, last, worst):
     found = kept(volume_ratio=ratio)
     assert (found["volume_ratio"], found["volume_ratio_worst"]) == (last, worst)
     assert kept()["volume_ratio"] is None
-
-
-def test_the_scale_of_momentum_is_weighed_by_mass_and_has_each_particles_sound():
-    heavy = state(velocity=((4.0, 8.0), (0.0, 0.0)), mass=(3.0, 1.0))
-    heavy.pressure_by = lambda eos: np.array([4.0, 16.0])  # sound speeds of 2 and 4
-    column = {"momentum_x": [0.0, 2.0, 0.0, 0.0]}
-    # about the mean of 5: 3 (1 + 2) + (3 + 4)
-    assert kept(heavy, **column)["momentum_change"] == pytest.approx(2.0 / 16.0, rel=1e-14)
-
-
-def test_injected_energy_of_bound_gas_is_over_what_it_holds_itself():
-    found = kept(potential_energy=[-7.0, 0.0, 0.0, 0.0])
-    assert found["energy_injected"] == 0.4 / 8.0  # and not over 1, what the sum is
