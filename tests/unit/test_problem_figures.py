@@ -76,12 +76,6 @@ def test_a_clouds_velocity_is_the_mean_of_its_particles_over_the_winds():
     assert found["cloud_mass_fraction"] == problem.diagnostics(particles)["cloud_mass_fraction"]
 
 
-def test_a_cloud_without_a_wind_reports_its_mass_alone():
-    problem = blob.Problem(radius=2.0, mach=0.0)
-    particles, _ = cloud(problem)
-    assert set(problem.report(MONATOMIC, 3.0, particles, None)) == {"cloud_mass_fraction"}
-
-
 @pytest.mark.parametrize(("dimension", "ball"), [(2, np.pi), (3, 4.0 / 3.0 * np.pi)])
 def test_cloud_is_what_is_both_dense_and_cold_by_mass(dimension, ball):
     problem = blob.Problem(dimension=dimension, radius=2.0, density_ratio=5.0)
