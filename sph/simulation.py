@@ -45,9 +45,7 @@ class Simulation:
         self.held_supports = 0  # particles too lonely for a support within physics.max_support
         self.limit = None
         self.totals = None
-        self.baseline = (
-            None  # of the energy drift: set at the start, or for a restart by its caller
-        )
+        self.baseline = None  # of the energy drift: set at the start, or by `go_on_from`
         self.energy_drift = 0.0
         self.energy_added = 0.0  # by heating, since the run began
         self.energy_injected = 0.0  # to keep internal energies positive, since the run began
