@@ -86,10 +86,11 @@ class Domain:
         """Images that have been asked for, by the copies of the box along each axis."""
         return {}
 
-    def bring_inside(self, position, velocities) -> None:
+    def bring_inside(self, position, others) -> None:
         """Wrap periodic axes and reflect at walls, in place.
 
-        position (D, N); velocities: arrays (D, N) whose component changes sign in a reflection.
+        position (D, N); others: vectors (D, N), whose component changes sign in a reflection, and
+        tensors (D, D, N), whose mixed components do.
         """
         for axis, ((lo, hi), boundary) in enumerate(self._axes):
             x = position[axis]
@@ -104,8 +105,10 @@ class Domain:
             else:
                 beyond = outside[x[outside] != hi]
                 x[beyond], turned = _between_walls(x[beyond], lo, hi)
-                for velocity in velocities:
-                    velocity[axis, beyond[turned]] *= -1
+                for field in others:
+                    field[axis, ..., beyond[turned]] *= -1
+                    if field.ndim == 3:
+                        field[:, axis, beyond[turned]] *= -1
 
     @cached_property
     def longest_reach(self) -> float:

@@ -12,26 +12,13 @@ NEARER_UNITS = (
     "and cube are no numbers any more"
 )
 
-# A larger alpha keeps colliding gas from passing through itself where alpha is small; where it is
-# large it is a smaller one that lowers the drift (docs/measurements.md, "Time step and viscosity").
-SMALL_ALPHA, LARGE_ALPHA = 1.0, 2.0
-
 TINY_C = 1e-3  # below it steps are short because they are meant to be
-
-# What may hold the Courant number below physics.C.
-HOLDS = {
-    "signal_speed": "the stability of the leapfrog",
-    "viscosity": "physics.alpha",
-    "conductivity": "the strength of physics.conductivity",
-}
 
 SETS = {
     "signal_speed": "the speed of its signals",
     "energy": "u/|du/dt|, how fast it is heated or cooled",
     "acceleration": "its acceleration",
     "support": "how fast its support changes",
-    "viscosity": "physics.alpha and the speed of its signals",
-    "conductivity": "the strength of physics.conductivity and the speed of its signals",
     "approach": "its approach to gas that is not its neighbour yet",
 }
 SETS_FOR_ALL = {
@@ -49,26 +36,41 @@ def fault(simulation, what: str, remedy: str, particle: int) -> NumericalError:
     )
 
 
-def what_sets(limit) -> str:
-    """The particle and criterion of a step, in words."""
+def what_sets(simulation) -> str:
+    """The particle and criterion of the coming step, in words."""
+    limit = simulation.limit
     if not limit.particle:
         return SETS_FOR_ALL[limit.criterion]
-    return f"particle {limit.particle} sets it by {SETS[limit.criterion]}"
+    return f"particle {limit.particle} sets it by {_criterion(simulation.scene, limit.criterion)}"
+
+
+def _criterion(scene, criterion: str) -> str:
+    if criterion in SETS:
+        return SETS[criterion]
+    return next(filter(None, (part.criterion_words(criterion) for part in scene.all_parts)))
+
+
+def _holds(scene) -> str:
+    """What holds the Courant number below physics.C, in words."""
+    by = scene.step_bounds.criterion
+    words = (part.held_words(by) for part in scene.all_parts)
+    return next(filter(None, words), "the stability of the leapfrog")
+
+
+def _remedies(scene, trouble: str, held_by: str) -> list[str]:
+    return [one for part in scene.all_parts for one in part.remedies(trouble, held_by)]
 
 
 def smaller_steps(simulation) -> str:
     """What to try where steps were too long, of what can help with this run's settings."""
-    bounds = simulation.scene.step_bounds
-    held, by = bounds.held
+    scene = simulation.scene
+    bounds = scene.step_bounds
     remedies = ["a smaller physics.C"]
-    if held < bounds.courant:
-        remedies = [f"a physics.C below {held:.3g}, at which {HOLDS[by]} holds it already"]
-    if bounds.alpha > LARGE_ALPHA:
-        remedies.append("a smaller physics.alpha")
-    elif bounds.alpha < SMALL_ALPHA:
-        remedies.append("a larger physics.alpha if particles pass through each other")
-    if by == "conductivity":
-        remedies.append("a smaller strength of physics.conductivity")
+    if bounds.courant < scene.physics.C:
+        remedies = [
+            f"a physics.C below {bounds.courant:.3g}, at which {_holds(scene)} holds it already"
+        ]
+    remedies += _remedies(scene, "long steps", bounds.criterion)
     if not bounds.energy:
         remedies.append("physics.energy_limit = true")
     return ", ".join(remedies)
@@ -76,10 +78,8 @@ def smaller_steps(simulation) -> str:
 
 def held_courant(scene) -> str | None:
     """In words, that the run takes a smaller Courant number than physics.C; None if it does not."""
-    held, by = scene.step_bounds.held
-    if held == scene.config.physics.C:
-        return None
-    return f"physics.C = {scene.config.physics.C:g} is held at {held:.3g} by {HOLDS[by]}"
+    held, given = scene.step_bounds.courant, scene.physics.C
+    return None if held == given else f"physics.C = {given:g} is held at {held:.3g} by {_holds(scene)}"
 
 
 def longer_steps(simulation) -> str:
@@ -87,31 +87,25 @@ def longer_steps(simulation) -> str:
     scene, criterion = simulation.scene, simulation.limit.criterion
     if criterion == "energy":
         return "physics.energy_limit = false, which leaves fast heating and cooling to eq 32"
-    if criterion == "acceleration" and scene.external is not None:
-        return _softening(simulation)
-    if scene.config.physics.C < TINY_C:
+    by_part = _remedies(scene, "short steps", criterion)
+    if criterion == "acceleration" and by_part:
+        return by_part[0]
+    if scene.physics.C < TINY_C:
         return "a larger physics.C"
-    if criterion in ("viscosity", "conductivity"):
-        return f"less of what sets it: {HOLDS[criterion]}"
+    if by_part:
+        return by_part[0]
     return f"a restart from an earlier checkpoint with {smaller_steps(simulation)}"
 
 
 def drift_remedy(simulation) -> str:
     """What to try where total energy has drifted too far."""
-    remedies = [smaller_steps(simulation)]
-    if simulation.scene.external is not None:
-        remedies.append(_softening(simulation))
+    remedies = [smaller_steps(simulation), *_remedies(simulation.scene, "drift", "")]
     return f"{', '.join(remedies)}, or a larger physics.max_energy_drift if that is good enough"
 
 
 def of_numbers(simulation) -> str:
     """What to try where values are not finite: the start took no step that could be too long."""
     return smaller_steps(simulation) if simulation.step else NEARER_UNITS
-
-
-def _softening(simulation) -> str:
-    softened = getattr(simulation.scene.external, "softening", 0.0) > 0.0
-    return f"a {'larger ' * softened}softening of physics.external"
 
 
 def fault_of(simulation, name: str, values, bad, remedy: str) -> NumericalError:
@@ -122,36 +116,44 @@ def fault_of(simulation, name: str, values, bad, remedy: str) -> NumericalError:
     return fault(
         simulation,
         f"{name} of particle {p.id[i]} at {_place(p, i)} is {values[..., i]}; "
-        f"{count} particle(s) are so",
+        f"{count} particles affected",
         remedy,
         int(p.id[i]),
     )
 
 
 def endless_sum(simulation) -> NumericalError:
-    """The error to raise where what each particle has is a number, but not the sum of it."""
-    p, totals, external = simulation.particles, simulation.totals, simulation.scene.external
+    """The error to raise where every particle's value is finite, but not their sum."""
+    p, totals = simulation.particles, simulation.totals
     with np.errstate(all="ignore"):  # the very numbers that are looked for
-        if external is not None and not np.isfinite(totals.potential_energy):
-            name, each = "potential energy", external.potential(p.position)
-            remedy = f"{_softening(simulation)}, or no particle where its mass is"
+        name, each, remedy = _endless_energy(simulation) or (None, None, of_numbers(simulation))
+        if name is not None:
+            pass
         elif not np.isfinite(totals.kinetic_energy):
             name, each = "kinetic energy", (p.velocity**2).sum(axis=0)
-            remedy = of_numbers(simulation)
         elif not np.isfinite(totals.internal_energy):
             name, each = "internal energy", p.internal_energy
-            remedy = of_numbers(simulation)
         else:
             name, each = "rate of energy", p.energy_rate
-            remedy = of_numbers(simulation)
         i = int(np.argmax(np.abs(each)))
     return fault(
         simulation,
-        f"the sum of all {name} is no number; the most is with particle {p.id[i]} at "
+        f"the total {name} is not finite; the largest is that of particle {p.id[i]} at "
         f"{_place(p, i)}",
         remedy,
         int(p.id[i]),
     )
+
+
+def _endless_energy(simulation) -> tuple[str, np.ndarray, str] | None:
+    """Name, values (N,) and remedy of a part's energy whose sum is not finite."""
+    for part in simulation.scene.all_parts:
+        for column, each in part.energies(simulation.particles).items():
+            if not np.isfinite(simulation.totals.energies[column]):
+                found = part.remedies("endless energy", "")
+                remedy = ", ".join(found) or of_numbers(simulation)
+                return column.replace("_", " "), each, remedy
+    return None
 
 
 def starved(simulation, block: int) -> NumericalError:

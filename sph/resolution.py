@@ -87,7 +87,7 @@ def doubt(simulation) -> str | None:
 
 
 def _gap_of(simulation) -> Gap:
-    p, models, eos = simulation.particles, simulation.scene.models, simulation.scene.eos
+    p, models, eos = simulation.particles, simulation.scene.formulation.models, simulation.scene.eos
     with np.errstate(all="ignore"):  # gas that is torn apart, which the watchdog reports
         sound_speed = eos.sound_speed(p.density, eos.pressure(p.density, p.internal_energy))
     spacing = p.support / (models.support_ratio * models.eta)

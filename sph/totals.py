@@ -16,7 +16,7 @@ class Totals(NamedTuple):
     # the same of velocities relative to the mean one, along the axes that keep momentum
     kinetic_energy_without_bulk: float
     internal_energy: float
-    potential_energy: float  # in an external field, else 0
+    energies: dict[str, float]  # of parts, by column of the history
     momentum: np.ndarray  # (D,)
     volume: float  # sum m/rho
     min_density: float
@@ -24,6 +24,11 @@ class Totals(NamedTuple):
     min_internal_energy: float
     max_internal_energy: float
     rates: float  # of velocity and energy, all together: finite if each of them is
+
+    @property
+    def potential_energy(self) -> float:
+        """All energy that is neither kinetic nor internal."""
+        return sum(self.energies.values(), 0.0)
 
     @property
     def energy(self) -> float:
@@ -49,7 +54,7 @@ class Baseline(NamedTuple):
 
     @classmethod
     def at(cls, totals: Totals, added: float) -> "Baseline":
-        """As if a run began with these totals, after heating has added so much energy."""
+        """As if a run began with these totals, after sources have added so much energy."""
         return cls.of(
             totals.kinetic_energy_without_bulk,
             totals.internal_energy - added,
@@ -57,25 +62,29 @@ class Baseline(NamedTuple):
         )
 
     def drift(self, totals: Totals, added: float) -> float:
-        """Change of energy since the start, less what heating added, over the scale."""
+        """Change of energy since the start, less what sources added, over the scale."""
         change = totals.energy_without_bulk - added - self.energy
         if self.scale > 0.0:
             return float(change / self.scale)
         return math.copysign(math.inf, change) if change else 0.0
 
 
-def of(particles, external, keeps_momentum) -> Totals:
-    """The totals of `particles`; external: a model of `sph.external`, or None.
+def of(state, parts, keeps_momentum) -> Totals:
+    """The totals of a state; parts: those whose energies belong to the total.
 
     keeps_momentum (D,): 1.0 for axes along which total momentum is conserved, 0.0 for others.
     """
-    p = particles
+    s = state
     kinetic, relative, internal, *others = _totals(
-        p.mass, p.velocity, p.internal_energy, p.density, p.acceleration, p.energy_rate,
+        s.mass, s.velocity, s.internal_energy, s.density, s.acceleration, s.energy_rate,
         keeps_momentum,
     )  # fmt: skip
-    potential = 0.0 if external is None else float(p.mass @ external.potential(p.position))
-    return Totals(kinetic, relative, internal, potential, *others)
+    energies = {
+        name: float(s.mass @ each)
+        for part in parts
+        for name, each in part.energies(s).items()
+    }
+    return Totals(kinetic, relative, internal, energies, *others)
 
 
 @njit(**COMPILED)

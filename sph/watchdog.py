@@ -49,7 +49,6 @@ class Watchdog:
             for axis in open_axes
             for lo, hi in [box[axis]]
         ]
-        self._lowest_energy = getattr(scene.eos, "lowest_energy", None)
         self._end = scene.config.time.end
         self._marked = None  # (time, step) at which the present window began
         self._longest = 0.0  # time covered by the best window
@@ -75,7 +74,8 @@ class Watchdog:
 
     def check(self, simulation) -> None:
         """Raise NumericalError, which names a particle, where `simulation` cannot go on."""
-        self._check_gas(simulation)
+        for part in simulation.scene.all_parts:
+            part.check(simulation)
         self._check_numbers(simulation)
         self._check_energy(simulation)
         self._check_volume(simulation)
@@ -104,27 +104,9 @@ class Watchdog:
         raise fault(
             simulation,
             f"the time step fell to {dt:.3g}, too small to advance time: "
-            f"{what_sets(simulation.limit)}",
+            f"{what_sets(simulation)}",
             longer_steps(simulation),
             simulation.limit.particle,
-        )
-
-    def _check_gas(self, simulation) -> None:
-        """Gas that is torn apart: where sound has no speed, neither forces nor steps have sense."""
-        if self._lowest_energy is None:
-            return
-        p = simulation.particles
-        above = p.internal_energy - self._lowest_energy(p.density)
-        if not (above <= 0.0).any():
-            return
-        i = int(np.nanargmin(above))
-        raise fault(
-            simulation,
-            f"particle {p.id[i]} is pulled apart by more than its equation of state holds: its "
-            f"density is {p.density[i]:.6g}, its internal energy {p.internal_energy[i]:.6g}",
-            "a boundary other than open, where the density sum misses neighbours; a weaker "
-            "rarefaction; more particles",
-            int(p.id[i]),
         )
 
     def _check_energy(self, simulation) -> None:
@@ -176,7 +158,7 @@ class Watchdog:
             raise fault(
                 simulation,
                 f"the time step has collapsed to {simulation.limit.dt:.3g}: "
-                f"{what_sets(simulation.limit)}. The last {WINDOW} steps covered {covered:.3g} of "
+                f"{what_sets(simulation)}. The last {WINDOW} steps covered {covered:.3g} of "
                 f"time, where {WINDOW} steps of this run have covered {self._longest:.3g}",
                 longer_steps(simulation),
                 simulation.limit.particle,
@@ -186,7 +168,7 @@ class Watchdog:
             raise fault(
                 simulation,
                 f"the run will not come to its end: the last {WINDOW} steps covered {covered:.3g} "
-                f"of time, and {left:.3g} of it are left; {what_sets(simulation.limit)}",
+                f"of time, and {left:.3g} of it are left; {what_sets(simulation)}",
                 "a shorter time.end, or a setting that is not so far from its default",
                 simulation.limit.particle,
             )

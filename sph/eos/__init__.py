@@ -15,6 +15,13 @@ One that is an ideal gas in P + p_inf has the attributes `gamma` and `p_inf`, fo
 
 from sph import registry
 from sph.compiled import verb
+from sph.model import Model
+
+
+class Eos(Model):
+    """What an equation of state may leave out."""
+
+    lowest_energy = None
 
 
 @verb

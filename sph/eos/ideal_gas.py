@@ -1,14 +1,18 @@
-"""Ideal gas of constant adiabatic index (seed eqs 19-20)."""
+"""Ideal gas of constant adiabatic index (eqs 19-20)."""
 
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
 
+from sph.eos import Eos
+from sph.model import Parameter, model
 
+
+@model(Eos)
 class IdealGas(NamedTuple):
     """`gamma`: adiabatic index, the ratio of specific heats, above 1."""
 
-    gamma: float
+    gamma: Annotated[float, Parameter("adiabatic index, the ratio of specific heats", above=1.0)]
 
     p_inf = 0.0  # no parameter: what a stiffened gas has
 

@@ -5,19 +5,23 @@ an ideal gas: the same sound speed, isentropes and shocks. Water is near gamma =
 p_inf = 6e8 Pa.
 """
 
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
 
+from sph.eos import Eos
+from sph.model import Parameter, model
 
+
+@model(Eos)
 class StiffenedGas(NamedTuple):
     """`gamma` above 1; `p_inf`, a pressure, at least 0: the gas holds together down to -p_inf.
 
     u is positive well before that: the bound is u > p_inf/rho, where P = -p_inf and sound stops.
     """
 
-    gamma: float
-    p_inf: float
+    gamma: Annotated[float, Parameter("the ratio of specific heats of the gas", above=1.0)]
+    p_inf: Annotated[float, Parameter("pressure that holds the gas together", at_least=0.0)]
 
     def pressure(self, density, internal_energy):
         return (self.gamma - 1.0) * density * internal_energy - self.gamma * self.p_inf

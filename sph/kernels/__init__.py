@@ -13,10 +13,20 @@ and, where its particles pair at large eta, the attribute `pairs_above`: by dime
 eta at which the particles of uniform gas stay apart (docs/measurements.md, section "Pairing").
 """
 
+from types import MappingProxyType
+
 import numpy as np
 
 from sph import registry
 from sph.compiled import verb
+from sph.model import Model
+
+
+class Kernel(Model):
+    """What a kernel may leave out."""
+
+    flattened = False  # whether the force keeps the gradient near the centre
+    pairs_above = MappingProxyType({})
 
 
 @verb

@@ -1,18 +1,21 @@
-"""Cubic spline kernel (appendix of the seed's draft; Monaghan & Lattanzio 1985)."""
+"""Cubic spline kernel (Monaghan & Lattanzio 1985)."""
 
 import math
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 from sph.compiled import larger
+from sph.kernels import Kernel
+from sph.model import Parameter, model
 
 
+@model(Kernel)
 class CubicSpline(NamedTuple):
     """`flattened`: in the force, keep the gradient below q = 1/3 at its value there.
 
     (Thomas & Couchman 1992: particles at small separation still repel.) It enters eqs 22-23 only.
     """
 
-    flattened: bool = False
+    flattened: Annotated[bool, Parameter("keep the gradient below q = 1/3 in the force")] = False
 
     @property
     def pairs_above(self) -> dict[int, float]:

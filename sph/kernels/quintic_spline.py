@@ -8,8 +8,11 @@ from types import MappingProxyType
 from typing import NamedTuple
 
 from sph.compiled import larger
+from sph.kernels import Kernel
+from sph.model import model
 
 
+@model(Kernel)
 class QuinticSpline(NamedTuple):
     """No parameters."""
 

@@ -7,8 +7,11 @@ import math
 from typing import NamedTuple
 
 from sph.compiled import larger
+from sph.kernels import Kernel
+from sph.model import model
 
 
+@model(Kernel)
 class WendlandC4(NamedTuple):
     """No parameters."""
 

@@ -126,7 +126,7 @@ class Problem(Section):
 
         physics: the table of that name of the configuration.
         """
-        return other_physics(physics, "external", "heating")
+        return other_physics(physics)
 
     def exact_ends(self, eos) -> tuple[float, str]:
         """The time until which `exact` holds, and what ends it: the words after "when"."""
@@ -170,9 +170,9 @@ class Problem(Section):
         return {}
 
 
-def other_physics(physics, *keys: str) -> str | None:
-    """That the first of the keys of [physics] that is given is not in the exact solution."""
-    for key in keys:
-        if getattr(physics, key) is not None:
+def other_physics(physics, besides: str = "") -> str | None:
+    """Return that a given part of [physics], except `besides`, is not in the exact solution."""
+    for key in physics.given(changes_solution=True):
+        if key != besides:
             return f"the exact solution is that of gas without physics.{key}"
     return None

@@ -10,7 +10,8 @@ from typing import Annotated, ClassVar, Literal
 import numpy as np
 from pydantic import Field, model_validator
 
-from sph.external.point_mass import PointMass
+from sph import registry
+from sph.parts.external.point_mass import PointMass
 from sph.problems import base
 
 _SHARED = base.Problem.model_fields
@@ -84,12 +85,12 @@ class Problem(base.Problem):
         }
 
     def departs(self, physics) -> str | None:
-        if physics.external_model() != ORBITED:
+        if registry.model("sph.parts.external", physics.external) != ORBITED:
             return (
                 "the exact orbits are those about a point mass of 1 without softening, and "
                 "physics.external is another field"
             )
-        return base.other_physics(physics, "heating")
+        return base.other_physics(physics, besides="external")
 
     def exact_ends(self, eos) -> tuple[float, str]:
         """When sound has come from the edges, which expand, to the gas that errors are taken of."""

@@ -1,0 +1,23 @@
+"""Alpha rises with the compression of the flow and decays behind it.
+
+Eqs 6, 27, 28, 31 (Morris & Monaghan 1997; the source term as in Rosswog et al. 2000).
+"""
+
+from typing import Annotated, NamedTuple
+
+from sph.compiled import larger
+from sph.model import Parameter, model
+from sph.parts.viscosity import Switch
+
+
+@model(Switch)
+class MorrisMonaghan(NamedTuple):
+    """`min`: where alpha decays to; `max`: where strong compression drives it."""
+
+    min: Annotated[float, Parameter("smallest alpha: each alpha decays to this value", at_least=0.0)]
+    max: Annotated[float, Parameter("largest alpha, approached in strong compression", at_least=0.0)]
+
+    def alpha_rate(self, alpha, h, sound_speed, divergence):
+        decay = (alpha - self.min) * 0.25 * sound_speed / h  # eq 27
+        source = larger(-divergence * (self.max - alpha), 0.0 * alpha)  # eq 28
+        return source - decay
