@@ -1,6 +1,7 @@
 """The configuration: read from a file, overridden, written back, and a template of it."""
 
 import dataclasses
+import functools
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -33,6 +34,11 @@ class Config:
         if not include_run:
             del tables["run"]
         return "\n".join(_table_text(name, keys) for name, keys in tables.items())
+
+    @functools.cached_property
+    def recorded(self) -> str:
+        """The TOML text that checkpoints keep: all keys but those of [run]."""
+        return self.to_toml(include_run=False)
 
     def override(self, overrides: Sequence[str]) -> "Config":
         """This configuration with `a.b=VALUE` set on top. Raises ConfigError."""
