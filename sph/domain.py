@@ -65,8 +65,8 @@ class Domain:
 
     def _cells_within(self, reach: float) -> tuple[int, ...]:
         """How many copies of the box either way a reach covers, for each axis; at least 1."""
-        with np.errstate(all="ignore"):
-            lengths = [reach / (hi - lo) for lo, hi in self.box]
+        # as Python's numbers, whose overflow needs no np.errstate, which takes longer than all this
+        lengths = [float(reach) / (hi - lo) for lo, hi in self.box.tolist()]
         return tuple(math.ceil(min(each, FAR)) if each > 1.0 else 1 for each in lengths)
 
     def _images(self, cells: tuple[int, ...]) -> Images:

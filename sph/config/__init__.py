@@ -1,6 +1,7 @@
 """The configuration of a run: read from TOML, overridden, written as TOML, and a template."""
 
 import dataclasses
+import functools
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -34,6 +35,11 @@ class Config:
         if not include_run:
             del tables["run"]
         return "\n".join(_table_text(name, keys) for name, keys in tables.items())
+
+    @functools.cached_property
+    def recorded(self) -> str:
+        """The TOML text that checkpoints keep: all keys but those of [run]."""
+        return self.to_toml(include_run=False)
 
     def override(self, overrides: Sequence[str]) -> "Config":
         """Return a copy with the overrides `a.b=VALUE` applied. Raises ConfigError."""

@@ -13,6 +13,7 @@ and, where its particles pair at large eta, the attribute `pairs_above`: by dime
 eta at which the particles of uniform gas stay apart (docs/measurements.md, section "Pairing").
 """
 
+import functools
 from types import MappingProxyType
 
 import numpy as np
@@ -49,6 +50,7 @@ def force_over_q(self, dim, q):
     return self.force_over_q(dim, q)
 
 
+@functools.lru_cache(64, typed=True)  # typed: kernels of two classes may hold equal parameters
 def support_ratio(kernel, dimension: int) -> float:
     """H/h = 1/(2 sigma), sigma the kernel's standard deviation per axis (Dehnen & Aly 2012)."""
     dim = (0,) * dimension

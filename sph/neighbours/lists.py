@@ -126,6 +126,25 @@ def _fill_chunks(
         )
 
 
+@njit(**COMPILED)
+def _regions(room):
+    """Where the region of each chunk begins and, last, where the storage ends."""
+    region = np.zeros(room.size + 1, np.int64)
+    for chunk in range(room.size):
+        # 15 % to spare: lists rebuilt in a developing flow then rarely have to be built twice
+        region[chunk + 1] = region[chunk] + room[chunk] + room[chunk] // 7 + 64
+    return region
+
+
+@njit(**COMPILED)
+def _fits(needed, region):
+    """Whether every chunk's candidates fit into its region."""
+    fits = True
+    for chunk in range(needed.size):
+        fits = fits and needed[chunk] <= region[chunk + 1] - region[chunk]
+    return fits
+
+
 def build(tree, position, support, skin: float, images, team, room=None):
     """Lists of all blocks, and the room each chunk of them needed.
 
@@ -142,14 +161,13 @@ def build(tree, position, support, skin: float, images, team, room=None):
     count = np.empty(blocks, np.int64)
     needed = np.empty(chunks, np.int64)
     while True:
-        # 15 % to spare: lists rebuilt in a developing flow then rarely have to be built twice
-        region = np.concatenate([[0], np.cumsum(room + room // 7 + 64)])
+        region = _regions(room)
         kind = np.int32 if images.sign.shape[0] <= SHORT_IMAGES else np.int64
         candidates = np.empty(region[-1], kind)
         team.run(
             _fill_chunks, chunks, dim, tree, position, support, 1.0 + skin, images, region, start,
             count, candidates, needed, smallest=SMALLEST_RANGE // CHUNK,
         )  # fmt: skip
-        if np.all(needed <= np.diff(region)):
+        if _fits(needed, region):
             return Lists(start, count, candidates), needed
         room = needed.copy()

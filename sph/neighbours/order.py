@@ -57,6 +57,8 @@ def _select(key, order, identity, a, b, k):
 @njit(**COMPILED)
 def _longest_axis(position, order, a, b):
     best, axis = -1.0, 0
+    if position.shape[0] == 1:
+        return axis
     for d in range(position.shape[0]):
         lo = hi = position[d, order[a]]
         for p in range(a + 1, b):

@@ -64,11 +64,14 @@ def best_skin(step: float, dimension: int) -> float:
     Lists that are to serve k steps need a skin of 2 (k - 1) step beside the room for growth: each
     step then pays 1/k of a build, and passes over candidates that grow as (1 + skin)^D.
     """
-    costs = [
-        (BUILD_OVER_PASSES / k + (1 + GROWTH + 2 * (k - 1) * step) ** dimension, k)
-        for k in range(1, 21)
-    ]
-    return GROWTH + 2 * (min(costs)[1] - 1) * step
+    best, skin = np.inf, GROWTH
+    for k in range(1, 21):
+        wider = 2 * (k - 1) * step
+        cost = BUILD_OVER_PASSES / k + (1 + GROWTH + wider) ** dimension
+        if not cost < best:  # the costs are convex in k
+            break
+        best, skin = cost, GROWTH + wider
+    return skin
 
 
 class Search:

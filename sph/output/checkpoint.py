@@ -23,7 +23,7 @@ import numpy as np
 from sph import config as configuration
 from sph import fingerprint
 from sph.errors import ConfigError, FileError
-from sph.output import layout, stored, validity
+from sph.output import hdf5, layout, stored, validity
 from sph.output.files import Damaged, PatientFile, is_sealed, opened, replacing, seal
 from sph.output.stored import GROUP, Refused
 from sph.particles import Particles
@@ -83,7 +83,7 @@ def write(path: Path, checkpoint: Checkpoint) -> None:
         digest = beside.submit(state_hash, state)  # while HDF5 waits for the disk
         with h5py.File(disk, "w") as file:
             layout.write_public(file, checkpoint)
-            _write_private(file.create_group(GROUP), checkpoint, state, digest)
+            _write_private(hdf5.create_group(file, GROUP), checkpoint, state, digest)
         seal(disk)
         disk.raise_failure()
 
@@ -128,9 +128,10 @@ def _state(checkpoint: Checkpoint) -> dict[str, np.ndarray]:
 def _write_private(group: h5py.Group, checkpoint: Checkpoint, state, digest) -> None:
     """Write the state; digest: the future of its SHA-256."""
     for name, array in state.items():
-        group.create_dataset(name, data=array)  # no checksum of HDF5's: two digests are enough
-    text = checkpoint.config.to_toml(include_run=False)
-    group.attrs.update(
+        hdf5.write_dataset(group, name, array)  # no checksum of HDF5's: two digests are enough
+    text = checkpoint.config.recorded
+    hdf5.write_attributes(
+        group,
         {
             "format_version": FORMAT_VERSION,
             "configuration": text,
@@ -140,7 +141,7 @@ def _write_private(group: h5py.Group, checkpoint: Checkpoint, state, digest) -> 
             "machine": f"{platform.machine()} {sys.byteorder}-endian",
             "versions": _versions(),
             "computed_by": fingerprint.as_json(),
-        }
+        },
     )
 
 

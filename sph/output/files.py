@@ -124,14 +124,18 @@ class PatientFile(io.FileIO):
 
     def write(self, content) -> int:
         rest = memoryview(content).cast("B")
-        with self._noted():
+        try:  # no context manager, which costs as much as the write: a checkpoint is a hundred
             while rest:
                 rest = rest[super().write(rest) :]
+        except BaseException as failure:
+            self._note(failure)
         return len(content)
 
     def truncate(self, size: int | None = None) -> int:
-        with self._noted():
+        try:
             return super().truncate(size)
+        except BaseException as failure:
+            self._note(failure)
         return self.tell() if size is None else size
 
     def raise_failure(self) -> None:
@@ -139,12 +143,9 @@ class PatientFile(io.FileIO):
         if self._failure is not None:
             raise self._failure
 
-    @contextlib.contextmanager
-    def _noted(self) -> Iterator[None]:
-        try:
-            yield
-        except BaseException as failure:  # an interrupt is no better for HDF5 than a full disk
-            self._failure = self._failure or failure
+    def _note(self, failure: BaseException) -> None:
+        # an interrupt is no better for HDF5 than a full disk
+        self._failure = self._failure or failure
 
 
 # --- reading ---
@@ -209,7 +210,7 @@ def is_sealed(file: io.FileIO) -> bool:
 
 def _digest(file: io.FileIO, length: int) -> str:
     """SHA-256 of the first `length` bytes; the position is then behind them."""
-    digest, buffer = hashlib.sha256(), memoryview(bytearray(BUFFER))
+    digest, buffer = hashlib.sha256(), memoryview(bytearray(min(length, BUFFER)))
     file.seek(0)
     while length:
         count = file.readinto(buffer[: min(length, BUFFER)])

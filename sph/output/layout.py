@@ -12,6 +12,7 @@ import h5py
 import numpy as np
 
 from sph import kernels
+from sph.output import hdf5
 
 # Particles a chunk, 1 to 3 MB: the Fletcher-32 filter works by the chunk.
 LONGEST_CHUNK = 131_072
@@ -93,11 +94,12 @@ def write_public(file: h5py.File, checkpoint) -> None:
     """Write all public groups of `checkpoint` (a sph.output.checkpoint.Checkpoint)."""
     particles, problem = checkpoint.particles, checkpoint.config.problem
     frame = frame_of(problem, particles.position)
-    _write_attributes(file, _header(checkpoint, frame))
-    group = file.create_group("PartType0")
+    for name, attributes in _header(checkpoint, frame).items():
+        hdf5.write_attributes(hdf5.create_group(file, name), attributes)
+    group = hdf5.create_group(file, "PartType0")
     for name, array in _fields(checkpoint, frame).items():
         dataset = write_array(group, name, array)
-        dataset.attrs.update(_unit_attributes(FIELDS[name]))
+        hdf5.write_attributes(dataset, _unit_attributes(FIELDS[name]))
     for link, target in SINGULAR.items():
         group[link] = h5py.SoftLink(f"/PartType0/{target}")
 
@@ -105,7 +107,7 @@ def write_public(file: h5py.File, checkpoint) -> None:
 def write_array(group: h5py.Group, name: str, array: np.ndarray) -> h5py.Dataset:
     """A dataset in which damage is found when it is read (Fletcher-32)."""
     chunks = tuple(min(length, LONGEST_CHUNK) for length in array.shape)
-    return group.create_dataset(name, data=array, chunks=chunks, fletcher32=True)
+    return hdf5.write_dataset(group, name, array, chunks)
 
 
 def _fields(checkpoint, frame: Frame) -> dict[str, np.ndarray]:
@@ -179,11 +181,6 @@ def _equation_of_state(eos) -> dict:
     if "gamma" in parameters:
         parameters["Adiabatic index"] = parameters.pop("gamma")
     return {"Equation of state": np.bytes_(name), **parameters}
-
-
-def _write_attributes(file: h5py.File, groups: Mapping[str, Mapping]) -> None:
-    for name, attributes in groups.items():
-        file.create_group(name).attrs.update(attributes)
 
 
 def _one_element(numbers: Mapping[str, float]) -> dict[str, np.ndarray]:
