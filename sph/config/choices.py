@@ -1,4 +1,4 @@
-"""Keys whose value names a file of a folder: a scheme, a kernel, an equation of state."""
+"""Types of keys whose value names a file in a package: a scheme, a kernel, an equation of state."""
 
 from typing import Annotated, Any, get_type_hints
 
@@ -11,7 +11,7 @@ from sph.problems.base import Section
 
 Gamma = Annotated[float, Field(gt=1)]
 
-# Bounds of the models' parameters: their NamedTuples know types and defaults, not bounds.
+# Bounds of the models' parameters: a NamedTuple declares type and default, but no bounds.
 _PARAMETERS = {
     "gamma": Gamma,
     "p_inf": Annotated[float, Field(ge=0)],
@@ -24,7 +24,7 @@ _PARAMETERS = {
 
 
 class Choice:
-    """Annotates a key whose value is the name of a file in `package`."""
+    """Annotates a key whose value is the name of a file in `package`, such as "sph.kernels"."""
 
     def __init__(self, package: str):
         self.package = package
@@ -39,23 +39,24 @@ class Choice:
         return "one of " + ", ".join(f'"{name}"' for name in self.valid_names())
 
     def check(self, value: Any) -> Any:
-        """The value in its resolved form. Raises the issues found, for pydantic to collect."""
+        """Return the resolved value. Raises a PydanticCustomError that holds the issues found."""
         if not isinstance(value, str) or value not in self.valid_names():
             raise as_error([wrong_value((), value, Annotated[Any, self])])
         return value
 
 
 class ModelChoice(Choice):
-    """The same where the file's model may have parameters, given in a table beside its name.
+    """Annotates a key whose value is a name, or a table { name, parameters of that model }.
 
-    Resolved, it is the name alone for a model without parameters, else a table with all of them.
+    The resolved value is the name alone for a model without parameters, otherwise a table with the
+    name and every parameter.
     """
 
     def describe(self) -> str:
-        return super().describe() + ", or a table { name, its parameters }"
+        return super().describe() + ", or a table { name, parameters }"
 
     def parameters(self, name: str) -> type[Section]:
-        """The parameters of that model as a table of the configuration."""
+        """Return a Section class with one key for each parameter of the model `name`."""
         model = registry.model_class(self.package, name)
         fields = {
             key: (_PARAMETERS.get(key, kind), model._field_defaults.get(key, ...))
