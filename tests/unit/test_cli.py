@@ -361,7 +361,7 @@ def test_numerical_failure(config, tmp_path):
 
 
 def test_missing_files(tmp_path):
-    assert_told(sph_("run", tmp_path / "no.toml"), 4, "no.toml: there is no such file")
+    assert_told(sph_("run", tmp_path / "no.toml"), 4, "no.toml: file not found")
     assert_told(sph_("run", tmp_path), 4, "a directory")
     assert_told(sph_("restart", tmp_path / "no"), 4, f"{tmp_path / 'no'} does not exist")
     assert_told(sph_("restart", tmp_path), 4, "is not a run directory")
