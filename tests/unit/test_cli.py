@@ -166,7 +166,7 @@ def test_set_and_threads(config, tmp_path):
 def test_force_replaces_a_run(done, config, tmp_path):
     run = copied(done, tmp_path / "run")
     (run / "notes.txt").write_text("mine")
-    assert_told(sph_("run", config, "-o", run), 4, "holds a run already", "--force", "sph restart")
+    assert_told(sph_("run", config, "-o", run), 4, "already holds a run", "--force", "sph restart")
     assert hashes(run) == hashes(done[0])
     result = sph_("run", config, "-o", run, "--force", "--set", "time.end=0.07")
     assert result.exit_code == 0
@@ -249,7 +249,7 @@ def test_new_writes_a_valid_configuration(name, tmp_path):
     assert sph_("new", name, "-o", target).stdout == f"wrote {target}\n"
     assert target.read_text() == result.stdout
     assert configuration.load(target).problem.name == name
-    assert_told(sph_("new", name, "-o", target), 4, "there already", "Try: ")
+    assert_told(sph_("new", name, "-o", target), 4, "already exists", "Try: ")
 
 
 def test_what_new_writes_runs(tmp_path):
