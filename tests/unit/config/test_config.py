@@ -533,7 +533,7 @@ def test_a_key_without_any_default_must_be_given(monkeypatch):
 
 def test_a_check_of_the_problem_itself_is_passed_on():
     message = only_error("# a gas\n" + MINIMAL + "discontinuity = 9.0")
-    assert message.startswith("x.toml, line 2: problem: discontinuity = 9.0 ")
+    assert message.startswith("x.toml, line 2: problem: discontinuity = 9.0: ")
 
 
 def test_no_override_of_a_run_names_the_run():
