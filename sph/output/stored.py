@@ -1,9 +1,9 @@
-"""What the group /Checkpoint of an HDF5 file holds, read so that no file can do harm.
+"""Safe reading of the group /Checkpoint of an HDF5 file, which may be damaged or hostile.
 
-Only what `sph.output.checkpoint` writes is read: each link, dataset and attribute is judged before
-HDF5 follows or fills it. HDF5 itself crashes, hangs or takes all memory on some damaged files. A
-file without a digest is therefore read by a child process first, under limits: this file alone,
-run as a script, so it imports nothing of sph.
+Only what `sph.output.checkpoint` writes is read. Each link, dataset and attribute is checked before
+HDF5 follows or reads it. HDF5 itself crashes, hangs or exhausts memory on some damaged files. So a
+file without a digest is first read by a child process with limited time and memory. The child runs
+this file as a script, which therefore imports nothing of sph.
 """
 
 import io
@@ -19,7 +19,7 @@ import numpy as np
 GROUP = "Checkpoint"
 SIGNATURE = b"\x89HDF\r\n\x1a\n"
 
-# Number of axes of each dataset; all are float64 but those of INTEGERS.
+# Number of axes of each dataset. All are float64 except INTEGERS.
 SCALARS = ("time", "step", "next_step", "list_skin")
 VECTORS = ("position", "velocity", "acceleration", "list_position")
 LISTS = ("id", "mass", "internal_energy", "support", "density", "omega", "energy_rate",
@@ -32,20 +32,20 @@ AXES = {
 }
 INTEGERS = ("id", "step")
 TEXTS = ("configuration", "lineage", "sha256", "configuration_sha256")
-LATER_TEXTS = ("computed_by",)  # which the first files did not have
+LATER_TEXTS = ("computed_by",)  # missing in the oldest files
 
-# What h5py raises on a damaged file, by where in it the damage is.
+# Exceptions of h5py on damaged files.
 DAMAGE = (OSError, RuntimeError, KeyError, ValueError, TypeError, AttributeError)
 
-# Limits of the child process: seconds and bytes, for the smallest file and for each of its bytes.
+# Limits of the child process in CPU seconds and bytes: a constant, and a part per byte of the file.
 SECONDS, SECONDS_A_BYTE = 5.0, 1 / 20e6
 MEMORY, MEMORY_A_BYTE = 256 << 20, 3
-# How much longer than its processor seconds it may take, on a machine that others use too.
+# Ratio of the wall-clock limit to the CPU limit, for a busy machine.
 PATIENCE = 6
 
 
 class Refused(Exception):
-    """Why a file is not read; kind: "damaged", "foreign" or "format" (the text is its number)."""
+    """A file is refused. kind: "damaged", "foreign" or "format" (its text is the format number)."""
 
     def __init__(self, kind: str, text: str):
         super().__init__(text)
@@ -53,9 +53,10 @@ class Refused(Exception):
 
 
 def load(file: io.FileIO, version: int) -> tuple[dict[str, np.ndarray], dict[str, str]]:
-    """The datasets and the texts of /Checkpoint. Raises Refused; version: the format known here.
+    """Return the datasets and the text attributes of /Checkpoint. Raises Refused.
 
-    HDF5 reads through `file`: it takes no lock, and opens no other file.
+    version: the format number that this version of sph reads. HDF5 reads through `file`, so it
+    takes no lock and opens no other file.
     """
     try:
         with h5py.File(file, "r") as opened:
@@ -74,7 +75,7 @@ def load(file: io.FileIO, version: int) -> tuple[dict[str, np.ndarray], dict[str
 
 
 def check_apart(file: io.FileIO, version: int) -> None:
-    """Read the file in a process of its own, under limits. Raises Refused."""
+    """Read the file in a child process with limited time and memory. Raises Refused."""
     size = os.fstat(file.fileno()).st_size
     seconds = SECONDS + SECONDS_A_BYTE * size
     command = [sys.executable, "-P", __file__, str(version), str(seconds)]
@@ -87,13 +88,15 @@ def check_apart(file: io.FileIO, version: int) -> None:
             check=False,
         )
     except subprocess.TimeoutExpired:
-        raise Refused("damaged", "HDF5 does not come to an end with it") from None
+        raise Refused("damaged", "HDF5 did not finish reading it in time") from None
     if child.returncode == 0:
         return
     try:
         raise Refused(*json.loads(child.stdout))
     except (ValueError, TypeError):
-        raise Refused("damaged", "HDF5 fails at it, or wants too much time or memory") from None
+        raise Refused(
+            "damaged", "HDF5 fails to read it, or needs too much time or memory"
+        ) from None
 
 
 def _group(file: h5py.File, version: int) -> h5py.Group:
@@ -110,15 +113,15 @@ def _group(file: h5py.File, version: int) -> h5py.Group:
 
 
 def _datasets(group: h5py.Group) -> dict[str, h5py.Dataset]:
-    """The datasets of /Checkpoint, not read yet."""
+    """Return the datasets of /Checkpoint, not yet read."""
     there = {name for name in AXES if name.encode() in group.id}
     missing = AXES.keys() - there - set(OF_SOME_SCENES)
     if missing or group.id.get_num_objs() != len(there):
         lacks = f": {', '.join(sorted(missing))} missing" if missing else ""
-        raise Refused("foreign", f"/{GROUP} has not the datasets of a checkpoint{lacks}")
+        raise Refused("foreign", f"/{GROUP} does not hold the datasets of a checkpoint{lacks}")
     for name in there:
         if not _is_hard(group.id, name.encode()):
-            raise Refused("foreign", f"{name} is a link to somewhere else")
+            raise Refused("foreign", f"{name} is a link to another place")
     return {name: h5py.Dataset(h5py.h5d.open(group.id, name.encode())) for name in sorted(there)}
 
 
@@ -127,7 +130,7 @@ def _is_hard(parent, name: bytes) -> bool:
 
 
 def _check(name: str, dataset: h5py.Dataset, size: int) -> None:
-    """Raise Refused where the dataset is not of the kind that checkpoints have."""
+    """Raise Refused if type, shape, filters or storage differ from those of a checkpoint."""
     kind = np.dtype(np.int64 if name in INTEGERS else np.float64)
     if dataset.dtype != kind or dataset.id.get_type().get_size() != kind.itemsize:
         raise Refused("foreign", f"{name} is of type {dataset.dtype.str}, expected {kind.str}")
@@ -156,19 +159,19 @@ def _attribute(group: h5py.Group, name: str, kind: type):
         else attribute.dtype.kind in "iu"
     )
     if attribute.shape != () or not fits:
-        raise Refused("foreign", f"the attribute {name} is not one {kind.__name__}")
+        raise Refused("foreign", f"the attribute {name} is not a single {kind.__name__}")
     return group.attrs[name]
 
 
 def _limit(size: int, seconds: float) -> None:
-    """Set the limits of this process, which has imported all it needs."""
+    """Limit the time and memory of this process, after its imports."""
     limits = {resource.RLIMIT_CPU: int(seconds) + 1, resource.RLIMIT_CORE: 0}
     try:
         with open("/proc/self/statm") as file:
             used = int(file.read().split()[0]) * os.sysconf("SC_PAGE_SIZE")
         limits[resource.RLIMIT_AS] = used + MEMORY + MEMORY_A_BYTE * size
     except OSError:
-        pass  # no such account on this system: the time alone is limited
+        pass  # this system has no /proc: only the time is limited
     for which, most in limits.items():
         hard = resource.getrlimit(which)[1]
         most = most if hard == resource.RLIM_INFINITY else min(most, hard)
@@ -176,7 +179,7 @@ def _limit(size: int, seconds: float) -> None:
 
 
 def main() -> int:
-    """Read the file on standard input; says on standard output why not, as JSON."""
+    """Read the file on standard input; print the reason for a refusal as JSON."""
     version, seconds = int(sys.argv[1]), float(sys.argv[2])
     _limit(os.fstat(0).st_size, seconds)
     try:

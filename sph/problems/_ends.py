@@ -1,4 +1,4 @@
-"""Waves that the ends of a domain send into uniform gas, by exact Riemann problems."""
+"""Waves from the ends of a domain into uniform gas, from exact solutions of Riemann problems."""
 
 import math
 from typing import NamedTuple
@@ -8,23 +8,24 @@ from sph.exact import riemann
 
 
 class Ends(NamedTuple):
-    """Speeds along one axis of the waves from its ends; infinite, outward, where there is none."""
+    """Velocities of the waves from the ends of an axis; -inf (low) and inf (high) if none."""
 
     low: float = -math.inf
     high: float = math.inf
 
     def between(self, box, time: float) -> tuple[float, float]:
-        """Where along the axis no wave has come from either end of `box` (2,)."""
+        """Return the range of the axis that waves from the ends of `box` (2,) have not reached."""
         if time == 0.0:
             return -math.inf, math.inf
         return box[0] + self.low * time, box[1] + self.high * time
 
 
 def of(boundary: str, low: riemann.State, high: riemann.State, eos) -> Ends:
-    """The waves of an axis whose gas is in those states beside its ends, velocities along it.
+    """Return the waves of an axis with gas in the states `low` and `high` at its ends.
 
-    Gas at an open end expands into vacuum, behind a wave at the speed of sound. At periodic ends
-    the gases of both meet, and at a wall gas meets its own mirror image.
+    The states have the velocity along the axis. At an open end gas expands into vacuum, behind a
+    wave at the speed of sound. At periodic ends the gases of both ends meet. At a wall the gas
+    meets its mirror image.
     """
     if boundary == "open":
         return Ends(
@@ -35,7 +36,7 @@ def of(boundary: str, low: riemann.State, high: riemann.State, eos) -> Ends:
     if low == high if boundary == "periodic" else at_rest:
         return Ends()
     if not is_gamma_law(eos):
-        return Ends(math.inf, -math.inf)  # unknown, so that no place is sure to be undisturbed
+        return Ends(math.inf, -math.inf)  # unknown: all of the axis may be disturbed
     if boundary == "periodic":
         first, last = riemann.reach(high, low, eos)
         return Ends(last, first)
@@ -46,17 +47,17 @@ def of(boundary: str, low: riemann.State, high: riemann.State, eos) -> Ends:
 
 
 def opens_vacuum(boundary: str, low: riemann.State, high: riemann.State, eos) -> bool:
-    """Whether gas leaves the ends of that axis faster than it can expand, arguments as of `of`."""
+    """Return whether gas leaves the ends of an axis faster than it can expand (see `of`)."""
     if boundary == "open":
         return False
     if not is_gamma_law(eos):
-        return low.velocity > 0.0 or high.velocity < 0.0  # not known to stay together
+        return low.velocity > 0.0 or high.velocity < 0.0  # unknown: a vacuum may open
     pairs = [(high, low)]
     if boundary == "mirror":
         pairs = [(_mirrored(low), low), (high, _mirrored(high))]
     try:
         return any(riemann.star_state(*pair, eos).vacuum for pair in pairs)
-    except ValueError:  # a pressure too low to compute with holds gas together no better
+    except ValueError:  # the pressure is too low to be computed, practically a vacuum
         return True
 
 

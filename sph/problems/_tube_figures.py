@@ -1,4 +1,4 @@
-"""Figures of a tube beside its exact solution: peaks, plateaus, shocks, contact."""
+"""Comparison of a shock tube with its exact solution: peaks, plateaus, shocks, contact."""
 
 from typing import NamedTuple
 
@@ -6,13 +6,13 @@ import numpy as np
 
 from sph.exact import riemann
 
-# A jump of density less than this, relative to the gas ahead, is no shock to look for: states that
-# are given in digits leave weak waves.
+# Shocks with a smaller jump of density, relative to the gas ahead, are ignored: states with rounded
+# digits produce weak waves.
 FAINT = 0.02
 
 
 class Tube(NamedTuple):
-    """What the particles show at a time and what they ought to, all along x (N,)."""
+    """State of the particles at a time and the exact state at their positions, each (N,)."""
 
     states: tuple[riemann.State, riemann.State]
     eos: tuple
@@ -28,7 +28,7 @@ class Tube(NamedTuple):
 
 
 def of(tube: Tube) -> dict[str, float]:
-    """The figures of `Problem.compare`, of those that this solution has."""
+    """Return the numbers of `Problem.compare` that exist for this solution."""
     star = riemann.star_state(*tube.states, tube.eos)
     speed = riemann.wave_speeds(*tube.states, tube.eos)
     figures = {
@@ -54,9 +54,10 @@ def _relative_error(tube: Tube) -> float:
 
 
 def _plateaus(tube: Tube, star: riemann.Star, speed: riemann.WaveSpeeds) -> dict[str, float]:
-    """The outer fifth of a plateau, a tenth at either end, is left out: waves are smeared there.
+    """Return errors of the plateaus, without a tenth at either end, where waves are smeared.
 
-    Velocities are over the larger of both waves' changes of it, which no frame of reference alters.
+    Velocity errors are relative to the larger change of velocity by the two waves, which does not
+    depend on the frame of reference.
     """
     figures = {}
     change = max(abs(star.velocity - state.velocity) for state in tube.states)
@@ -80,7 +81,7 @@ def _plateaus(tube: Tube, star: riemann.Star, speed: riemann.WaveSpeeds) -> dict
 
 
 def _shocks(tube: Tube, star: riemann.Star, speed: riemann.WaveSpeeds) -> dict[str, float]:
-    """Where the density crosses the middle of its jump, counted from outside."""
+    """Return errors of shock positions, where the density first crosses the middle of its jump."""
     figures = {}
     inward = np.argsort(tube.x)
     for side, ahead, shock, tail, behind, order in (
@@ -97,7 +98,7 @@ def _shocks(tube: Tube, star: riemann.Star, speed: riemann.WaveSpeeds) -> dict[s
             continue
         x, above = tube.x[order], tube.density[order] - 0.5 * (ahead.density + behind)
         first = int(np.argmax(above > 0.0))
-        if first == 0:  # none is so dense, or the region begins behind the shock
+        if first == 0:  # no particle is dense enough, or the region begins behind the shock
             continue
         share = above[first] / (above[first] - above[first - 1])
         found = x[first] + share * (x[first - 1] - x[first])
@@ -107,7 +108,7 @@ def _shocks(tube: Tube, star: riemann.Star, speed: riemann.WaveSpeeds) -> dict[s
 
 
 def _contact_energy_excess(tube: Tube, speed: riemann.WaveSpeeds) -> float:
-    """Over the star states, or where no particle is in them over the nearest two."""
+    """Return the excess in the star states, or at the nearest two particles if they are empty."""
     x, contact = tube.x, speed.contact * tube.time
     between = (speed.left_tail * tube.time < x) & (x < speed.right_tail * tube.time)
     for side in (x < contact, x >= contact):

@@ -166,7 +166,7 @@ def test_set_and_threads(config, tmp_path):
 def test_force_replaces_a_run(done, config, tmp_path):
     run = copied(done, tmp_path / "run")
     (run / "notes.txt").write_text("mine")
-    assert_told(sph_("run", config, "-o", run), 4, "holds a run already", "--force", "sph restart")
+    assert_told(sph_("run", config, "-o", run), 4, "already holds a run", "--force", "sph restart")
     assert hashes(run) == hashes(done[0])
     result = sph_("run", config, "-o", run, "--force", "--set", "time.end=0.07")
     assert result.exit_code == 0
@@ -249,7 +249,7 @@ def test_new_writes_a_valid_configuration(name, tmp_path):
     assert sph_("new", name, "-o", target).stdout == f"wrote {target}\n"
     assert target.read_text() == result.stdout
     assert configuration.load(target).problem.name == name
-    assert_told(sph_("new", name, "-o", target), 4, "there already", "Try: ")
+    assert_told(sph_("new", name, "-o", target), 4, "already exists", "Try: ")
 
 
 def test_what_new_writes_runs(tmp_path):
@@ -361,7 +361,7 @@ def test_numerical_failure(config, tmp_path):
 
 
 def test_missing_files(tmp_path):
-    assert_told(sph_("run", tmp_path / "no.toml"), 4, "no.toml: there is no such file")
+    assert_told(sph_("run", tmp_path / "no.toml"), 4, "no.toml: file not found")
     assert_told(sph_("run", tmp_path), 4, "a directory")
     assert_told(sph_("restart", tmp_path / "no"), 4, f"{tmp_path / 'no'} does not exist")
     assert_told(sph_("restart", tmp_path), 4, "is not a run directory")

@@ -97,4 +97,6 @@ def test_a_system_that_is_not_posix(missing):
     code = f"import sys; sys.modules[{missing!r}] = None; from sph.__main__ import main; main()"
     done = python("-c", code)
     assert (done.returncode, done.stdout) == (4, "")
-    assert done.stderr.startswith("sph: this system is not POSIX: sph runs on Linux and macOS.\n")
+    assert done.stderr.startswith(
+        "sph: this operating system is not supported: expected Linux or macOS.\n"
+    )

@@ -136,12 +136,12 @@ def test_spacings_carry_the_contrast_of_particles_of_one_mass(dimension, n, rati
 
 
 def test_step_of_one_mass_is_another_problem():
-    with pytest.raises(ValidationError, match="take shock_tube"):
+    with pytest.raises(ValidationError, match="shock_tube"):
         Contrast(masses="equal")
 
 
 def test_thin_gas_of_less_than_a_support_is_refused():
-    with pytest.raises(ValidationError, match="expected 4; take more particles"):
+    with pytest.raises(ValidationError, match=r"expected 4\."):
         Contrast(dimension=2, n=1000, masses="equal", profile="graded")
 
 
@@ -198,7 +198,7 @@ def test_gas_that_was_heated_or_thinned_is_no_cloud():
 
 
 def test_wind_needs_room_around_the_cloud():
-    with pytest.raises(ValidationError, match="narrower than the box"):
+    with pytest.raises(ValidationError, match="expected a diameter below"):
         Blob(radius=5.0)
 
 
@@ -270,11 +270,11 @@ def test_centre_of_mass_is_found_to_have_left_its_path():
 @pytest.mark.parametrize(
     ("keys", "message"),
     [
-        ({"n": 3}, "expected the number of positions, 2"),
-        ({"positions": [[0.0, 1.0], [0.0, 0.0]]}, "has not 1 components"),
-        ({"velocities": [[0.0]]}, "velocities: 1 of them, expected 2"),
-        ({"masses": [1.0, 0.0]}, "expected above 0"),
-        ({"internal_energies": -1.0}, "expected above 0"),
+        ({"n": 3}, "expected 2, the number of positions"),
+        ({"positions": [[0.0, 1.0], [0.0, 0.0]]}, "expected 1 components"),
+        ({"velocities": [[0.0]]}, "velocities: 1 values; expected 2"),
+        ({"masses": [1.0, 0.0]}, "expected values above 0"),
+        ({"internal_energies": -1.0}, "expected values above 0"),
         ({"positions": [[0.0], [1.5]], "boundary": "mirror"}, r"\[1.5\] is outside \[-1.0, 1.0\]"),
         ({"positions": []}, "at least 1 item"),
     ],

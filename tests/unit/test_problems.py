@@ -244,7 +244,7 @@ def test_layers_keep_their_distance_across_diaphragm_and_transverse_faces():
 def test_a_domain_whose_cells_cannot_be_counted_is_refused():
     domain = "[[-1e-160, 1e-160], [-0.25, 0.25], [-0.25, 0.25]]"
     text = f'[problem]\nname = "shock_tube"\ndimension = 3\ndomain = {domain}\n'
-    with pytest.raises(ConfigError, match=r"problem: .* expected numbers nearer to 1"):
+    with pytest.raises(ConfigError, match=r"problem: .* expected numbers closer to 1"):
         from_text(text)
 
 
@@ -257,7 +257,7 @@ def test_walls_part_from_gas_whose_pressure_is_too_low_to_compute_with():
 @pytest.mark.filterwarnings("error")
 def test_gases_too_different_in_density_for_n_are_refused(side):
     thin = {"density": 1e-150, "velocity": 0.0, "pressure": 1.0}
-    with pytest.raises(ValidationError, match=r"n = 2000 is too small: a layer.* takes \d"):
+    with pytest.raises(ValidationError, match=r"n = 2000: expected at least \S+, for one layer"):
         ShockTube(**{**SOD_3D, "n": 2000, side: thin})
 
 
@@ -374,11 +374,11 @@ def test_figures_of_a_region_without_particles_are_left_out():
 @pytest.mark.parametrize(
     ("keys", "message"),
     [
-        ({"discontinuity": 0.5}, "is not inside"),
-        ({"error_range": [0.4, -0.4]}, "with lo below hi"),
-        ({"error_range": [10.0, 11.0]}, "is outside the domain"),
+        ({"discontinuity": 0.5}, "expected x inside"),
+        ({"error_range": [0.4, -0.4]}, "with lo < hi"),
+        ({"error_range": [10.0, 11.0]}, "inside the domain"),
         ({"lattice": "bcc"}, 'take "cubic"'),
-        ({"n": 3, "right": {"density": 1e-3, "pressure": 1.0}}, "takes 1000"),
+        ({"n": 3, "right": {"density": 1e-3, "pressure": 1.0}}, "at least 1000"),
         ({"left": {"density": 0.0, "pressure": 1.0}}, "greater than 0"),
     ],
 )
@@ -471,7 +471,7 @@ def test_momentum_weighted_radius_of_the_exact_profile_is_exact():
 
 
 def test_more_energetic_particles_than_there_are_is_refused():
-    with pytest.raises(Exception, match="energy_particles = 32, but there are only 8"):
+    with pytest.raises(Exception, match="energy_particles = 32: expected at most 8"):
         PointExplosion(n=8).initial(MONATOMIC)
 
 
@@ -596,7 +596,7 @@ def test_smooth_layers_follow_the_published_profile():
 
 @pytest.mark.parametrize("problem", [KelvinHelmholtz, SmoothKelvinHelmholtz])
 def test_shear_layers_refuse_another_domain(problem):
-    with pytest.raises(ValidationError, match="along both axes only"):
+    with pytest.raises(ValidationError, match="the only domain"):
         problem(domain=[0.0, 2.0])
     for key, value in (("boundary", "mirror"), ("dimension", 3)):
         with pytest.raises(ValidationError):
@@ -640,7 +640,7 @@ def test_lattice_without_noise_feels_no_force(dimension, kind):
 
 
 def test_uniform_velocity_has_a_component_for_each_axis():
-    with pytest.raises(ValidationError, match="one component for each of 2 axes"):
+    with pytest.raises(ValidationError, match="expected 2 components"):
         Uniform(velocity=[1.0, 2.0, 3.0])
     with pytest.raises(ValidationError, match='take "cubic" or "hexagonal"'):
         Uniform(lattice="bcc")

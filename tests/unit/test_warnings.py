@@ -256,7 +256,7 @@ def test_texts_have_the_numbers_of_the_run(texts):
     assert "m/rho is 0.8 of" in found["volume"]
     assert "by 25 %" in found["volume"]
     assert "3 of 40 particles" in found["held_supports"]
-    assert "held at 0.125" in found["held_supports"]
+    assert "upper limit, 0.125" in found["held_supports"]
     assert found["resolution"] == "far from 0"
     assert "neighbour is 0.25 of" in found["paired"]
 

@@ -414,5 +414,5 @@ def test_pictures_are_not_written_through_a_link(tube, tmp_path):
 
 def test_checkpoints_of_two_problems_make_no_evolution(tube, shear):
     shutil.copy(shear.checkpoint_path(0), tube.checkpoint_path(0))
-    with pytest.raises(FileError, match=r"is not of this run: problem\.name"):
+    with pytest.raises(FileError, match=r"belongs to another run: problem\.name"):
         list(find_source(tube.path).over_time(6))

@@ -16,16 +16,16 @@ PROBLEMS = registry.names("sph.problems")
 ENDS = {
     "walls": ("shock_tube", (), 0.5 / 1.75216, r"reaches the end at x = 0\.5"),
     "a periodic tube": (
-        "shock_tube", ("problem.boundary=periodic",), 0.25 / 1.75216, "meets that from the end",
+        "shock_tube", ("problem.boundary=periodic",), 0.25 / 1.75216, "meets the wave from the end",
     ),
     "an open tube": (
-        "shock_tube", ("problem.boundary=open",), 0.5 / (1.75216 + 1.05830), "meets that",
+        "shock_tube", ("problem.boundary=open",), 0.5 / (1.75216 + 1.05830), "meets the wave",
     ),
     # gas at -1 hits the lower wall, whose shock runs at Mach M, M^2 - 1.2 M/1.18322 - 1 = 0
     "a tube between walls that moves": (
         "shock_tube",
         ("problem.left.velocity=-1", "problem.right.velocity=-1"),
-        0.5 / (1.62830 * 1.18322 + 1.18322), r"meets that from the end at x = -0\.5",
+        0.5 / (1.62830 * 1.18322 + 1.18322), r"meets the wave from the end at x = -0\.5",
     ),
     "a tube that is open sideways": (
         "shock_tube", ("problem.dimension=2", "problem.boundary=['mirror', 'open']"), 0.0,

@@ -107,7 +107,7 @@ def test_a_line_cut_by_a_kill_is_left_out_and_resumed_over(history):
 @pytest.mark.parametrize(
     ("content", "word"),
     [
-        (None, "there is no history"),
+        (None, "history not found"),
         (b"", "not a history"),
         (b"x,y\n1,2\n", "not a history"),
         (b"step,t\n1,2\n3\n", "line 3"),
@@ -162,5 +162,5 @@ def test_rows_of_a_history_that_was_replaced_go_nowhere(history):
 def test_a_header_that_is_cut(tmp_path, header):
     path = tmp_path / "history.csv"
     path.write_text(f"{header}\n")
-    with pytest.raises(FileError, match=r"(lacks the columns dt, |is not a history).*\nTry: "):
+    with pytest.raises(FileError, match=r"(has no columns dt, |is not a history).*\nTry: "):
         read(path)

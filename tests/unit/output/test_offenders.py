@@ -37,7 +37,7 @@ def test_neighbours_are_those_of_either_support_nearest_first_across_the_faces(f
     assert [line.split()[:2] for line in lines] == [
         ["1", "0"], ["3", "0.04"], ["4", "0.07"], ["2", "0.35"],
     ]  # fmt: skip
-    assert last == "These are all its neighbours."
+    assert last == "(no further neighbours)"
     assert str(path) in where
 
 
@@ -45,7 +45,7 @@ def test_more_than_a_screen_of_them_are_counted(failed, tmp_path):
     state = failed(np.linspace(-0.1, 0.1, 12), 0.3)
     words = offenders.leave(tmp_path / "offenders.h5", state, 4).splitlines()
     assert len(words) == 1 + offenders.SHOWN + 2
-    assert words[-2] == f"and {12 - offenders.SHOWN} more neighbours."
+    assert words[-2] == f"... and {12 - offenders.SHOWN} more neighbours."
 
 
 def test_a_particle_that_is_nowhere_comes_first_and_alone(failed, tmp_path):
@@ -66,4 +66,4 @@ def test_nothing_is_left_of_no_particle(failed, tmp_path):
 
 def test_what_cannot_be_written_does_not_hide_what_went_wrong(failed, tmp_path):
     words = offenders.leave(tmp_path / "none" / "offenders.h5", failed([0.1], 0.2), 1)
-    assert "They could not be written: " in words
+    assert "could not be written: " in words

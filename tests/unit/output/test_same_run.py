@@ -88,9 +88,9 @@ def test_a_run_as_it_was_written(run):
         (lambda text: text[:5], "step 4, that of the checkpoint, is missing"),
         (lambda text: text[:1], "step 4, that of the checkpoint, is missing"),
         (lambda text: [*text[:4], text[3], *text[4:]], "step 3 is missing before step 2"),
-        (lambda text: ["step,t\n"], "lacks the columns dt"),
+        (lambda text: ["step,t\n"], "has no columns dt"),
         (lambda text: [text[0].replace("energy_drift,", "drift,"), *text[1:]],
-         "lacks the columns energy_drift: .* another version"),
+         "has no columns energy_drift: .* another version"),
         (lambda text: [text[0].replace("cpu_seconds\n", "cpu_seconds,strange\n"),
                        *(one[:-1] + ",1.0\n" for one in text[1:])], "it has columns strange"),
     ],
@@ -118,18 +118,18 @@ def test_a_history_of_other_values(run, step, column, value):
     if column == "t":
         value = "1.00001"
     with_value(run, step, column, value)
-    refused(run, f"not of this run: {column} = {float(value)} at step {step}")
+    refused(run, f"belongs to another run: {column} = {float(value)} at step {step}")
 
 
 def test_a_history_that_is_missing(run):
     run.history.unlink()
-    refused(run, "there is no history")
+    refused(run, "history not found")
     check(run, 0)  # as a copied checkpoint that was not gone on from yet
 
 
 def test_a_configuration_of_another_problem(run, make_state):
     run.write_config(make_state(dimension=2).config.to_toml())
-    refused(run, r"config\.toml is not of this run: problem\.dimension, problem\.domain")
+    refused(run, r"config\.toml belongs to another run: problem\.dimension, problem\.domain")
 
 
 @pytest.mark.parametrize("number", [1, 3])  # the one before the checkpoint and the one after
@@ -150,12 +150,12 @@ def test_a_checkpoint_of_another_run(run, state, make_state, number, what):
     words = {
         "dimension": r"problem\.dimension",
         "alpha": "alpha = 1.0 and alpha = 3.0" if number == 3 else "alpha = 3.0 and alpha = 1.0",
-        "step": "do not come after step",
-        "time": "do not come after step",
+        "step": "is not after step",
+        "time": "is not after step",
         "lineage": "its lineage does not continue",
-        "particles": "its particles are not those",
+        "particles": "its particle IDs differ",
     }
-    refused(run, f"is not of this run: .*{words[what]}")
+    refused(run, f"belongs to another run: .*{words[what]}")
 
 
 def test_a_session_may_have_other_settings_if_its_lineage_says_so(run, state):
