@@ -97,6 +97,7 @@ class Part:
     passes: tuple[Pass, ...] = ()
     terms: Mapping[str, Any] = {}  # models that the formulation's pair loops call, by their role
     needs: tuple[str, ...] = ()  # fields that it asks the formulation for
+    columns: tuple[str, ...] = ()  # of the history: the names in `energies` and `sums`
     keeps_momentum: bool = True
     bounds_acceleration: bool = False  # whether |a| bounds the step
     adds_energy: bool = False  # whether `split` may

@@ -95,26 +95,13 @@ def state_of(simulation: Simulation, lineage: tuple[str, ...] = ()) -> Checkpoin
         list_skin=origin.skin,
         config=simulation.scene.config,
         lineage=lineage,
+        energies=simulation.energies,
     )
 
 
 def new_history(config: Config, simulation: Simulation, directory: RunDirectory) -> History:
-    extra = [*_of_the_scene(simulation), *config.problem.diagnostics(simulation.particles)]
+    extra = [*simulation.columns(), *config.problem.diagnostics(simulation.particles)]
     return History.create(directory.history, config.problem.dimension, extra)
-
-
-def _of_the_scene(simulation: Simulation) -> dict[str, float]:
-    """Columns of the history that only some scenes have."""
-    scene, columns = simulation.scene, {}
-    if scene.max_support < math.inf:
-        columns["held_supports"] = simulation.held_supports
-    if scene.is_filled:
-        columns["volume_ratio"] = simulation.volume_ratio
-    if scene.external is not None:
-        columns["potential_energy"] = simulation.totals.potential_energy
-    if scene.heating is not None:
-        columns["energy_added"] = simulation.energy_added
-    return columns
 
 
 def threads_of(config: Config) -> int:
@@ -260,7 +247,7 @@ class Runner:
         }
         momentum = zip("xyz", totals.momentum.tolist(), strict=False)
         row |= {f"momentum_{axis}": component for axis, component in momentum}
-        row |= _of_the_scene(simulation)
+        row |= simulation.columns()
         with simulation.clock.phase("diagnostics"):
             row |= self.config.problem.diagnostics(simulation.particles)
         self.history.append(row)

@@ -16,6 +16,7 @@ import sys
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 import h5py
 import numpy as np
@@ -26,11 +27,13 @@ from sph.errors import ConfigError, FileError
 from sph.output import hdf5, layout, stored, validity
 from sph.output.files import Damaged, PatientFile, is_sealed, opened, replacing, seal
 from sph.output.stored import GROUP, Refused
-from sph.particles import Particles
+from sph.scene import Scene
+from sph.state import State
+from sph.totals import Baseline
 from sph.version import __version__
 
 # To be raised with every change of what the datasets of /Checkpoint mean.
-FORMAT_VERSION = 1
+FORMAT_VERSION = 2
 
 NOT_PARTICLES = ("time", "step", "next_step", "list_position", "list_support", "list_skin")
 
@@ -40,11 +43,19 @@ PART = "a particle that failed and its neighbours, alone"
 START_ELSEWHERE = "Try: an earlier checkpoint of the run, or start the run anew."
 
 
+class Energies(NamedTuple):
+    """What a run counts since it began, and what its energy drift is measured from."""
+
+    injected: float  # to keep internal energies positive
+    added: float  # by sources
+    baseline: Baseline
+
+
 @dataclass
 class Checkpoint:
     """The state at the end of a step, and all that a restart needs to go on bit for bit."""
 
-    particles: Particles
+    particles: State
     time: float
     step: int  # steps done
     next_step: float  # dt of the coming step, before it is cut to land on an output
@@ -53,16 +64,26 @@ class Checkpoint:
     list_skin: float  # their skin, as a fraction of H
     config: configuration.Config
     lineage: tuple[str, ...]  # the runs it came from, oldest first
+    energies: Energies | None = None  # None: of format 1, which leaves them to the history
     computed_by: str | None = None  # of one that was read: `fingerprint.as_json` of its writer
+
+    @functools.cached_property
+    def scene(self) -> Scene:
+        """The scene of the configuration."""
+        return Scene(self.config)
 
     @property
     def pressure(self) -> np.ndarray:
-        """(N,) pressure of the corrected internal energy, as the scheme understands it."""
-        return self.particles.pressure_by(self.config.physics.eos_model())
+        """(N,) pressure of the corrected internal energy, as the formulation understands it."""
+        return self.scene.formulation.pressure(self.particles)
 
     def field(self, name: str) -> np.ndarray:
-        """(N,) or (D, N) of the particles, pressure included."""
-        return self.pressure if name == "pressure" else getattr(self.particles, name)
+        """(N,) or (D, N) of the particles, pressure included. Raises KeyError."""
+        if name == "pressure":
+            return self.pressure
+        if (found := self.particles.get(name)) is None:
+            raise KeyError(name)
+        return found
 
     def by_id(self, values: np.ndarray) -> np.ndarray:
         """`values`, (N,) or (D, N), in the order of the particles' IDs."""
@@ -104,8 +125,7 @@ def read(path: Path) -> Checkpoint:
         ) from None
     _check_hashes(path, state, texts)
     config = _config(path, texts["configuration"])
-    checkpoint = _checkpoint(state, config, _lineage(path, texts["lineage"]))
-    checkpoint.computed_by = texts.get("computed_by")
+    checkpoint = _checkpoint(path, state, config, texts)
     _check_state(path, checkpoint)
     return checkpoint
 
@@ -122,7 +142,16 @@ def state_hash(state: dict[str, np.ndarray]) -> str:
 
 def _state(checkpoint: Checkpoint) -> dict[str, np.ndarray]:
     state = {name: np.asarray(getattr(checkpoint, name)) for name in NOT_PARTICLES}
+    if checkpoint.energies is not None:
+        injected, added, baseline = checkpoint.energies
+        values = np.array([injected, added, *baseline])
+        state |= {name: values[k] for k, name in enumerate(stored.ENERGIES)}
     return state | checkpoint.particles.arrays()
+
+
+def _fields(particles: State) -> str:
+    """Rank of each stored field, and whether a restart can make it anew, as JSON."""
+    return json.dumps({f.name: [f.rank, f.remade] for f in particles.fields if f.stored})
 
 
 def _write_private(group: h5py.Group, checkpoint: Checkpoint, state, digest) -> None:
@@ -133,7 +162,8 @@ def _write_private(group: h5py.Group, checkpoint: Checkpoint, state, digest) -> 
     hdf5.write_attributes(
         group,
         {
-            "format_version": FORMAT_VERSION,
+            "format_version": FORMAT_VERSION if checkpoint.energies is not None else 1,
+            "fields": _fields(checkpoint.particles),
             "configuration": text,
             "lineage": json.dumps(checkpoint.lineage),
             "sha256": digest.result(),
@@ -213,9 +243,7 @@ def _check_state(path: Path, checkpoint: Checkpoint) -> None:
     if not faults and PART not in checkpoint.lineage:  # a part shows numbers that are wrong
         faults = validity.faults_of_value(checkpoint)
     if faults:
-        raise FileError(
-            f"{path} does not hold the state of a run: {'; '.join(faults)}.\n{START_ELSEWHERE}"
-        )
+        raise _not_of_a_run(path, faults)
 
 
 def _lineage(path: Path, text: str) -> tuple[str, ...]:
@@ -238,15 +266,49 @@ def _config(path: Path, text: str) -> configuration.Config:
         ) from error
 
 
-def _checkpoint(state: dict, config, lineage: tuple[str, ...]) -> Checkpoint:
-    return Checkpoint(
-        time=float(state.pop("time")),
-        step=int(state.pop("step")),
-        next_step=float(state.pop("next_step")),
-        list_position=state.pop("list_position"),
-        list_support=state.pop("list_support"),
-        list_skin=float(state.pop("list_skin")),
-        particles=Particles(**state),
+def _checkpoint(path: Path, state: dict, config, texts: dict[str, str]) -> Checkpoint:
+    energies = None
+    if stored.ENERGIES[0] in state:
+        injected, added, *baseline = (float(state.pop(name)) for name in stored.ENERGIES)
+        energies = Energies(injected, added, Baseline(*baseline))
+    others = {name: state.pop(name) for name in NOT_PARTICLES}
+    scene = Scene(config)
+    _check_fields(path, state, scene, texts.get("fields"))
+    found = Checkpoint(
+        particles=State(scene.fields, state),
+        time=float(others["time"]),
+        step=int(others["step"]),
+        next_step=float(others["next_step"]),
+        list_position=others["list_position"],
+        list_support=others["list_support"],
+        list_skin=float(others["list_skin"]),
         config=config,
-        lineage=lineage,
+        lineage=_lineage(path, texts["lineage"]),
+        energies=energies,
+        computed_by=texts.get("computed_by"),
+    )
+    found.scene = scene
+    return found
+
+
+def _check_fields(path: Path, arrays: dict, scene: Scene, fields: str | None) -> None:
+    """Raise FileError where the fields are not those of the scene, but for what can be remade."""
+    remade = set(stored.OF_SOME_SCENES[1:])  # of format 1
+    if fields is not None:
+        remade = {name for name, (_, one) in stored.fields_of(fields).items() if one}
+    needed = {field.name for field in scene.fields if field.stored}
+    faults = [
+        f"{name} is missing, which contradicts its configuration"
+        for name in sorted(needed - arrays.keys() - {f.name for f in scene.fields if f.remade})
+    ] + [
+        f"{name} is present, which contradicts its configuration"
+        for name in sorted(arrays.keys() - needed - remade)
+    ]
+    if faults:
+        raise _not_of_a_run(path, faults)
+
+
+def _not_of_a_run(path: Path, faults: list[str]) -> FileError:
+    return FileError(
+        f"{path} does not hold the state of a run: {'; '.join(faults)}.\n{START_ELSEWHERE}"
     )

@@ -8,7 +8,7 @@ from sph.domain import Domain
 from sph.errors import FileError
 from sph.output import checkpoint as checkpoints
 from sph.output.checkpoint import PART, Checkpoint
-from sph.particles import Particles
+from sph.state import State
 
 # Most lines of the table, so that the message fits one screen.
 SHOWN = 8
@@ -53,12 +53,8 @@ def _neighbourhood(state: Checkpoint, i: int) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _part(state: Checkpoint, indices: np.ndarray) -> Checkpoint:
-    arrays = {
-        name: np.ascontiguousarray(array[..., indices])
-        for name, array in state.particles.arrays().items()
-    }
     return Checkpoint(
-        particles=Particles(**arrays),
+        particles=state.particles.subset(indices),
         time=state.time,
         step=state.step,
         next_step=state.next_step,
@@ -67,10 +63,11 @@ def _part(state: Checkpoint, indices: np.ndarray) -> Checkpoint:
         list_skin=state.list_skin,
         config=state.config,
         lineage=(*state.lineage, PART),
+        energies=state.energies,
     )
 
 
-def _table(particles: Particles, indices: np.ndarray, distance: np.ndarray) -> str:
+def _table(particles: State, indices: np.ndarray, distance: np.ndarray) -> str:
     names = ("ID", "distance", "support", "density", "energy", "du/dt", "speed", "|dv/dt|")
     lines = ["".join(f"{name:>11}" for name in names)]
     for i, r in zip(indices[:SHOWN], distance, strict=False):

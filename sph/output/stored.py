@@ -9,6 +9,7 @@ this file as a script, which therefore imports nothing of sph.
 import io
 import json
 import os
+import re
 import resource
 import subprocess
 import sys
@@ -21,18 +22,20 @@ SIGNATURE = b"\x89HDF\r\n\x1a\n"
 
 # Number of axes of each dataset. All are float64 except INTEGERS.
 SCALARS = ("time", "step", "next_step", "list_skin")
-VECTORS = ("position", "velocity", "acceleration", "list_position")
-LISTS = ("id", "mass", "internal_energy", "support", "density", "omega", "energy_rate",
-         "list_support")  # fmt: skip
-OF_SOME_SCENES = ("alpha", "alpha_rate", "pressure")
-AXES = {
-    **dict.fromkeys(SCALARS, 0),
-    **dict.fromkeys((*LISTS, *OF_SOME_SCENES), 1),
-    **dict.fromkeys(VECTORS, 2),
+ENERGIES = ("energy_injected", "energy_added", "baseline_energy", "baseline_scale")  # format 2
+LISTS = {"list_position": 2, "list_support": 1}
+# Fields of every checkpoint, and those that one of format 1 may have; format 2 names its fields.
+FIELDS = {
+    **dict.fromkeys(
+        ("id", "mass", "internal_energy", "support", "density", "omega", "energy_rate"), 1
+    ),
+    **dict.fromkeys(("position", "velocity", "acceleration"), 2),
 }
+OF_SOME_SCENES = ("alpha", "alpha_rate", "pressure")
+NAME = re.compile(r"[a-z][a-z0-9_]{0,60}")
 INTEGERS = ("id", "step")
 TEXTS = ("configuration", "lineage", "sha256", "configuration_sha256")
-LATER_TEXTS = ("computed_by",)  # missing in the oldest files
+LATER_TEXTS = ("computed_by", "fields")  # missing in the oldest files
 
 # Exceptions of h5py on damaged files.
 DAMAGE = (OSError, RuntimeError, KeyError, ValueError, TypeError, AttributeError)
@@ -55,16 +58,17 @@ class Refused(Exception):
 def load(file: io.FileIO, version: int) -> tuple[dict[str, np.ndarray], dict[str, str]]:
     """Return the datasets and the text attributes of /Checkpoint. Raises Refused.
 
-    version: the format number that this version of sph reads. HDF5 reads through `file`, so it
+    version: the newest format number that this version of sph reads. HDF5 reads through `file`, so it
     takes no lock and opens no other file.
     """
     try:
         with h5py.File(file, "r") as opened:
-            group = _group(opened, version)
+            group, found = _group(opened, version)
             size = os.fstat(file.fileno()).st_size
-            datasets = _datasets(group)
+            axes, optional = _axes(group, found)
+            datasets = _datasets(group, axes, optional)
             for name, dataset in datasets.items():
-                _check(name, dataset, size)
+                _check(name, axes[name], dataset, size)
             if sum(one.nbytes for one in datasets.values()) > size:
                 raise Refused("foreign", "its datasets are larger than the file")
             later = [one for one in LATER_TEXTS if h5py.h5a.exists(group.id, one.encode())]
@@ -99,7 +103,8 @@ def check_apart(file: io.FileIO, version: int) -> None:
         ) from None
 
 
-def _group(file: h5py.File, version: int) -> h5py.Group:
+def _group(file: h5py.File, version: int) -> tuple[h5py.Group, int]:
+    """Return /Checkpoint and the number of its format."""
     name = GROUP.encode()
     if name not in file.id or not _is_hard(file.id, name):
         raise Refused("foreign", f"it has no group /{GROUP}")
@@ -107,15 +112,43 @@ def _group(file: h5py.File, version: int) -> h5py.Group:
     if not h5py.h5a.exists(group.id, b"format_version"):
         raise Refused("foreign", f"/{GROUP} has no format_version")
     found = int(_attribute(group, "format_version", int))
-    if found != version:
+    if not 1 <= found <= version:
         raise Refused("format", str(found))
-    return group
+    return group, found
 
 
-def _datasets(group: h5py.Group) -> dict[str, h5py.Dataset]:
+def _axes(group: h5py.Group, version: int) -> tuple[dict[str, int], set[str]]:
+    """Return the number of axes of each dataset, and the names of those that may be missing."""
+    known = {**dict.fromkeys(SCALARS, 0), **LISTS, **FIELDS}
+    if version == 1:
+        return known | dict.fromkeys(OF_SOME_SCENES, 1), set(OF_SOME_SCENES)
+    named = fields_of(_attribute(group, "fields", str))
+    axes = {name: rank + 1 for name, (rank, _) in named.items()}
+    for name in FIELDS.keys() & axes.keys():
+        if axes[name] != FIELDS[name]:
+            raise Refused("foreign", f"the field {name} is of rank {axes[name] - 1}")
+    return {**dict.fromkeys((*SCALARS, *ENERGIES), 0), **LISTS, **axes}, set()
+
+
+def fields_of(text: str) -> dict[str, tuple[int, bool]]:
+    """Return rank, and whether it may be missing, of each field named in `fields`. Raises Refused."""
+    try:
+        found = {name: (int(rank), bool(remade)) for name, (rank, remade) in json.loads(text).items()}
+    except (ValueError, TypeError, AttributeError, RecursionError):
+        raise Refused("foreign", "its list of fields is not one") from None
+    reserved = {*SCALARS, *ENERGIES, *LISTS}
+    for name, (rank, _) in found.items():
+        if not NAME.fullmatch(name) or name in reserved or not 0 <= rank <= 2:
+            raise Refused("foreign", f"its list of fields has {name[:60]!a} of rank {rank}")
+    return found
+
+
+def _datasets(
+    group: h5py.Group, axes: dict[str, int], optional: set[str]
+) -> dict[str, h5py.Dataset]:
     """Return the datasets of /Checkpoint, not yet read."""
-    there = {name for name in AXES if name.encode() in group.id}
-    missing = AXES.keys() - there - set(OF_SOME_SCENES)
+    there = {name for name in axes if name.encode() in group.id}
+    missing = axes.keys() - there - optional
     if missing or group.id.get_num_objs() != len(there):
         lacks = f": {', '.join(sorted(missing))} missing" if missing else ""
         raise Refused("foreign", f"/{GROUP} does not hold the datasets of a checkpoint{lacks}")
@@ -129,12 +162,12 @@ def _is_hard(parent, name: bytes) -> bool:
     return parent.links.get_info(name).type == h5py.h5l.TYPE_HARD
 
 
-def _check(name: str, dataset: h5py.Dataset, size: int) -> None:
+def _check(name: str, axes: int, dataset: h5py.Dataset, size: int) -> None:
     """Raise Refused if type, shape, filters or storage differ from those of a checkpoint."""
     kind = np.dtype(np.int64 if name in INTEGERS else np.float64)
     if dataset.dtype != kind or dataset.id.get_type().get_size() != kind.itemsize:
         raise Refused("foreign", f"{name} is of type {dataset.dtype.str}, expected {kind.str}")
-    if len(dataset.shape or ()) != AXES[name] or dataset.shape is None:
+    if len(dataset.shape or ()) != axes or dataset.shape is None:
         raise Refused("foreign", f"{name} has the shape {dataset.shape}")
     plan = dataset.id.get_create_plist()
     filters = [plan.get_filter(i)[0] for i in range(plan.get_nfilters())]

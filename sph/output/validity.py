@@ -8,8 +8,6 @@ import numpy as np
 
 from sph.neighbours.lists import MAX_PARTICLES
 
-POSITIVE = ("mass", "support", "density", "list_support")
-AT_LEAST_ZERO = ("internal_energy", "alpha")
 # Far above the skin of any run, which is below 1 (sph.neighbours.search.best_skin).
 MOST_SKIN = 10.0
 MOST_STEPS = 2**53  # the history holds float64, which counts exactly up to here
@@ -22,13 +20,8 @@ def faults_of_shape(checkpoint) -> list[str]:
     if not 1 <= n <= MAX_PARTICLES:
         return [f"it has {n} particles, expected 1 to {MAX_PARTICLES}"]
     found = []
-    # alpha_rate and pressure are optional: a restart adds or drops them as its scene needs
-    evolves = config.physics.viscosity_model().evolves
-    if evolves != (particles.alpha is not None):
-        there = "missing" if evolves else "present"
-        found.append(f"alpha is {there}, which contradicts its configuration")
     for name, array in _arrays(checkpoint).items():
-        expected = (n,) if array.ndim == 1 else (D, n)
+        expected = (D,) * (array.ndim - 1) + (n,)
         if array.shape != expected:
             found.append(f"{name} has the shape {array.shape}, expected {expected}")
     ids = np.sort(particles.id)
@@ -40,14 +33,23 @@ def faults_of_shape(checkpoint) -> list[str]:
 def faults_of_value(checkpoint) -> list[str]:
     """Return descriptions of what is wrong with the values of a checkpoint with valid shapes."""
     found = [f"{name} = {value}" for name, value in _bad_scalars(checkpoint)]
+    above, at_least = _bounds(checkpoint)
     for name, array in _arrays(checkpoint).items():
         if not np.all(np.isfinite(array)):
-            found.append(f"{name} has non-finite values")
-        elif name in POSITIVE and not array.min() > 0.0:
-            found.append(f"{name} has values that are not positive")
-        elif name in AT_LEAST_ZERO and array.min() < 0.0:
-            found.append(f"{name} has negative values")
+            found.append(f"{name} is not finite everywhere")
+        elif name in above and not array.min() > above[name]:
+            found.append(f"{name} is not above {above[name]:g} everywhere")
+        elif name in at_least and array.min() < at_least[name]:
+            found.append(f"{name} is below {at_least[name]:g} somewhere")
     return found or _faults_of_place(checkpoint)
+
+
+def _bounds(checkpoint) -> tuple[dict[str, float], dict[str, float]]:
+    """Return what the values of fields must be above, and at least."""
+    fields = checkpoint.particles.fields
+    above = {field.name: field.above for field in fields if field.above is not None}
+    at_least = {field.name: field.at_least for field in fields if field.at_least is not None}
+    return {"list_support": 0.0, **above}, at_least
 
 
 def _bad_scalars(checkpoint):

@@ -179,6 +179,10 @@ class Gas(Formulation):
             s.get("exchange_share"), s.acceleration, s.energy_rate, s.signal_speed,
         )  # fmt: skip
 
+    @property
+    def label(self):
+        return self.scheme.name
+
     def remake(self, state, missing):
         if "pressure" in missing and self.scheme.sums_pressure:
             state.pressure[:] = self.eos.pressure(state.density, state.internal_energy)

@@ -39,6 +39,7 @@ class External(Part):
         ),
     )
     balances_pressure = True
+    columns = ("potential_energy",)
     keeps_momentum = False
     bounds_acceleration = True
 
