@@ -29,6 +29,7 @@ from sph.output.files import (
 )
 from sph.output.json_text import json_text
 from sph.shell_words import quoted
+from sph.summary import Summary, of_json
 
 CHECKPOINT_NAME = re.compile(r"checkpoint_(\d{6,})\.h5")
 
@@ -205,8 +206,21 @@ class RunDirectory:
         """
         write_text(self.summary, json_text(summary))
 
+    def whole_summary(self) -> Summary:
+        """The summary of a run that has ended. Raises FileError where it cannot be read."""
+        try:
+            return of_json(read_text(self.summary))
+        except (OSError, ValueError, RecursionError) as error:
+            raise FileError(
+                f"{self.summary} cannot be read: {error}.\n"
+                "Try: the sph that wrote it; or `sph restart` of its directory, if it is damaged."
+            ) from None
+
     def read_summary(self) -> dict:
-        """What summary.json holds, or an empty dictionary where it cannot be read."""
+        """What summary.json holds, or an empty dictionary where it cannot be read.
+
+        To ask for the status of a run that may not have ended; `whole_summary` has the figures.
+        """
         try:
             found = json.loads(read_text(self.summary))
         except (OSError, FileError, ValueError, RecursionError):

@@ -24,6 +24,7 @@ from sph.output import checkpoint as checkpoints
 from sph.output.checkpoint import Checkpoint
 from sph.output.history import read as read_history
 from sph.output.run_directory import RunDirectory
+from sph.summary import Summary, lookup
 
 KINDS = (
     "errors", "relative", "report", "nearest", "conservation", "cost", "steps", "particles",
@@ -38,7 +39,7 @@ OF_STATE = {"min": np.min, "max": np.max}
 class Figures:
     """Figures of the run in a directory that has ended, each worked out when it is asked for."""
 
-    def __init__(self, directory: Path, summary: dict):
+    def __init__(self, directory: Path, summary: Summary | None):
         self.run = RunDirectory(directory)
         self.summary = summary
 
@@ -50,7 +51,7 @@ class Figures:
             "state": self._of_state, "change": self._change, "warnings": self._warnings,
         }  # fmt: skip
         try:
-            return float(makers[kind](*rest) if kind in makers else self._said(kind, *rest))
+            return float(makers[kind](*rest) if kind in makers else lookup(self.summary, name))
         except (KeyError, AttributeError, IndexError, TypeError, ValueError):
             return NONE
 
@@ -66,17 +67,11 @@ class Figures:
     def _last(self) -> Checkpoint:
         return checkpoints.read(self.run.checkpoints()[-1])
 
-    def _said(self, *names: str):
-        found = self.summary
-        for name in names:
-            found = found[name]
-        return found
-
     def _warnings(self, kind: str):
         return warnings.kinds(self.summary).count(kind)
 
     def _error(self, field: str, norm: str):
-        return self._said("errors", "fields", field, norm)
+        return lookup(self.summary, f"errors.fields.{field}.{norm}")
 
     def _of_history(self, column: str, kind: str):
         values = self._history[column]

@@ -71,7 +71,7 @@ def _badness(check: Check) -> tuple[bool, bool, float]:
 def judge(case: Case, setting: str, task: Task) -> Result:
     """The result of a run that has ended, by its files. Raises FileError."""
     (row,) = read_runs([task.run.path]) if task.status else (None,)
-    figures = Figures(task.run.path, row.summary if row else {})
+    figures = Figures(task.run.path, row.summary if row else None)
     checks = tuple(
         Check(name, figures.value(name) if row else NONE, bound)
         for name, bound in case.bounds(setting).items()
@@ -109,6 +109,5 @@ def _numbers(row: Row | None, figures: Figures) -> dict:
         "lowest_density": figures.value("history.min_density.min"),
         "steps": row.steps,
         "smallest_step": figures.value("history.dt.min"),
-        # the history of a run that failed ends before its last step, which may have compiled
-        "cpu_seconds": max(0.0, row.cost["cpu"]),
+        "cpu_seconds": row.cost["cpu"],
     }
