@@ -30,12 +30,17 @@ from sph.clock import STARTING
 NON_FINITE = ("nan", "inf", "-inf")
 
 
-class Norms(TypedDict):
-    """Norms of the error of a field (`sph.analysis.errors`)."""
+class AbsoluteNorms(TypedDict):
+    """Norms of the error of a field, in the units of the field (`sph.analysis.errors.norms`)."""
 
     L1: float
     L2: float
     Linf: float
+
+
+class Norms(AbsoluteNorms):
+    """With L1 relative to the exact field (`sph.analysis.errors.by_field`)."""
+
     relative_L1: float | None  # None where the exact field is zero everywhere
 
 

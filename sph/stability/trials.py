@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from sph import config as configuration
-from sph import standard_streams
+from sph import progress
 from sph.errors import ConfigError, FileError, NumericalError, Stopped, first_line
 from sph.stability.criterion import NONE, Criterion, Judge, Trial
 from sph.sweep import local
@@ -32,6 +32,7 @@ class Trials:
         self.config = configuration.load(config, overrides)
         self.sweep = SweepDirectory(directory.absolute())
         self.done: dict[float, Trial] = {}
+        self.shown = progress.suited_to_runs("trials", None)  # bisection decides how many
         courant = float(f"{self.config.physics.C * criterion.reference:.6g}")
         (task,) = self._run([self._point(COURANT, courant)])
         if task.status is None:
@@ -65,7 +66,7 @@ class Trials:
         found = self._run([self._point(self.key, value) for value in missing])
         for value, task in zip(missing, found, strict=True):
             self.done[value] = self._trial(value, task)
-            self._say(self.done[value])
+            self._told(self.done[value])
         return [self.done[value].is_stable for value in values]
 
     def _point(self, key: str, value: float) -> Point:
@@ -99,6 +100,6 @@ class Trials:
             return Trial(value, name, "failed", reason, NONE, "", NONE, 0.0, 0, 0.0)
         return self.judge.trial(value, task.run.path)
 
-    def _say(self, trial: Trial) -> None:
+    def _told(self, trial: Trial) -> None:
         reason = f": {trial.reason}" if trial.reason else ""
-        standard_streams.note(f"{self.key} = {trial.value:g}: {trial.verdict}{reason}")
+        self.shown.ended(f"{self.key} = {trial.value:g}: {trial.verdict}{reason}")

@@ -8,7 +8,7 @@ import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 
-from sph import standard_streams
+from sph import progress
 from sph.errors import FileError, Stopped
 from sph.output.files import explained, write_text
 from sph.stress import table
@@ -53,7 +53,10 @@ def run(
     suite = Suite(load(only), directory)
     missing = [task for _, _, task in suite.runs.values() if not _has_ended(task)]
     told = _Told(suite, len(missing))
-    local.run(missing, jobs, told)
+    try:
+        local.run(missing, jobs, told)
+    finally:
+        told.shown.close()
     if told.unwritten:
         raise FileError(told.unwritten)
     if told.stopped:
@@ -73,26 +76,18 @@ class _Told:
 
     def __init__(self, suite: Suite, missing: int):
         self.suite = suite
-        self.all = len(suite.runs)
-        self.ended = self.all - missing
+        self.shown = progress.suited_to_runs("runs", len(suite.runs), len(suite.runs) - missing)
         self.stopped = 0
-        self.unwritten = ""  # by which run, and why: no verdict on its method
-        if self.ended:
-            self._say(f"{self.ended} of {self.all} runs are done already")
+        self.unwritten = ""  # which run could not write, and why: that says nothing of its method
 
     def __call__(self, outcome: Outcome) -> None:
         if outcome.status == "stopped":
             self.stopped += 1
-            self._say(f"{outcome.name} stopped: {outcome.reason}")
+            self.shown.note(f"{outcome.name} stopped: {outcome.reason}")
             return
         if outcome.code == FileError.exit_code:
             self.unwritten = f"{outcome.name}: {outcome.reason}"
-        self.ended += 1
-        verdict = self.suite.result(outcome.name).verdict
-        self._say(f"[{self.ended:{len(str(self.all))}d}/{self.all}] {outcome.name}: {verdict}")
-
-    def _say(self, line: str) -> None:
-        standard_streams.note(line)
+        self.shown.ended(f"{outcome.name}: {self.suite.result(outcome.name).verdict}")
 
 
 def _point(case: Case, setting: str) -> Point:
