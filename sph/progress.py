@@ -40,7 +40,7 @@ class Lines(Messages):
         )
 
     def _left(self, simulated, now):
-        begin, started = self._from
+        begin, started = self._from or (simulated, now)
         if not simulated > begin:
             return ""
         left = (now - started) * (self.end - simulated) / (simulated - begin)

@@ -30,7 +30,7 @@ class Gap(NamedTuple):
     """The least resolved number of a state: a position or velocity, and what it must resolve."""
 
     kind: str  # "position" or "velocity"
-    index: int  # of the particle in memory order
+    index: int  # type: ignore[assignment]  # of the particle in memory order
     size: float  # distance to the next float64
     scale: float  # the particle's spacing, or speed of sound and relative velocity together
 

@@ -30,6 +30,9 @@ from sph.clock import STARTING
 NON_FINITE = ("nan", "inf", "-inf")
 
 
+Status = Literal["done", "stopped", "failed"]
+
+
 class AbsoluteNorms(TypedDict):
     """Norms of the error of a field, in the units of the field (`sph.analysis.errors.norms`)."""
 
@@ -112,7 +115,7 @@ class Warned(TypedDict):
 class Summary(TypedDict):
     """A run that has ended."""
 
-    status: Literal["done", "stopped", "failed"]
+    status: Status
     reason: str | None  # why the run stopped or failed
     warnings: list[Warned]
     version: str  # of sph
@@ -125,7 +128,7 @@ class Summary(TypedDict):
     settings_changed: list[str]  # by restarts
     errors: Errors | None
     errors_left_out: str | None  # why there are no errors
-    report: dict[str, float | None] | None  # the problem's own figures; None where the run failed
+    report: dict[str, float] | None  # the problem's own figures; None where the run failed
     conservation: Conservation
     nearest: Nearest | None  # None where the run failed
     cost: Cost

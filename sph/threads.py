@@ -6,7 +6,9 @@ Every particle is written by the one range that holds it, so the split does not 
 
 import itertools
 import os
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
+from typing import Any
 
 # Blocks below which a range is not worth handing to another thread: handing over costs some 50
 # microseconds, and 256 blocks of eight particles are 600 of them in 1-D, 5000 in 3-D.
@@ -27,7 +29,10 @@ class Team:
         self.threads = threads
         self._pool = ThreadPoolExecutor(threads, "sph") if threads > 1 else None
 
-    def run(self, function, items: int, *arguments, smallest: int = SMALLEST_RANGE) -> None:
+    def run(
+        self, function: Callable[..., None], items: int, *arguments: Any,
+        smallest: int = SMALLEST_RANGE,
+    ) -> None:  # fmt: skip
         """Call function(first, last, *arguments) over ranges that cover [0, items).
 
         No range is shorter than `smallest` items.

@@ -44,7 +44,7 @@ def against_exact(config: Config, time: float, particles, pressure) -> Errors | 
     if truth.left_out(config, time, particles.position):
         return None
     problem, eos = config.problem, config.physics.eos_model()
-    exact = problem.exact(eos, time, particles.position)
+    exact = problem.exact(eos, time, particles.position) or {}
     inside, words = truth.region(problem, eos, time, particles.position)
     state = {
         "density": particles.density,

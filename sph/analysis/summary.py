@@ -8,13 +8,13 @@ import numpy as np
 from sph import warnings
 from sph.analysis import errors, truth
 from sph.config import restarts
-from sph.summary import Conservation, Cost, Summary
+from sph.summary import Conservation, Cost, Status, Summary
 from sph.totals import Baseline
 from sph.version import __version__
 
 
 def of_run(
-    simulation, history: dict[str, np.ndarray], status: str, reason: str | None,
+    simulation, history: dict[str, np.ndarray], status: Status, reason: str | None,
     lineage: tuple[str, ...] = (),
 ) -> Summary:  # fmt: skip
     """The summary, from the simulation's last state and the whole history.
@@ -72,7 +72,7 @@ def _judge(result: Summary, simulation, history) -> None:
 def warn(summary: Summary, simulation) -> None:
     """Set the warnings of a summary that is otherwise complete."""
     found = warnings.of_run(simulation, summary)
-    summary["warnings"] = [one._asdict() for one in found]
+    summary["warnings"] = [{"kind": one.kind, "text": one.text} for one in found]
 
 
 def conservation(history, particles, scene) -> Conservation:

@@ -1,6 +1,7 @@
 """A commented configuration to start from."""
 
 import textwrap
+from collections.abc import Mapping
 from typing import Any
 
 from pydantic import BaseModel
@@ -10,14 +11,15 @@ from sph.config import restarts
 from sph.config.errors import branches, describe, field_annotation
 from sph.config.toml_text import value_text
 from sph.docstrings import docstring
+from sph.problems.base import Section
 
 
-def text(sections: dict[str, BaseModel]) -> str:
+def text(sections: Mapping[str, Section]) -> str:
     """TOML with every key of these tables at its value, above it its help, bounds and default."""
     return "\n".join(_table(name, section) for name, section in sections.items())
 
 
-def _table(name: str, section: BaseModel) -> str:
+def _table(name: str, section: Section) -> str:
     model = type(section)
     keys = (
         _key(key, field, _help(model, key), getattr(section, key), _restart(model, key))
@@ -33,7 +35,7 @@ def _help(model: type[BaseModel], key: str) -> str:
     return next((field.description for field in fields if field and field.description), key)
 
 
-def _restart(model: type[BaseModel], key: str) -> str:
+def _restart(model: type[Section], key: str) -> str:
     """The key's class in a restart, where not all keys of its table have the same."""
     return "" if model.restart else f"in a restart: {restarts.class_of(model, key)}"
 

@@ -129,7 +129,7 @@ def resolve(
     overrides: Sequence[str],
     sections: dict[str, type[Section]],
     recorded: bool = False,
-) -> dict[str, Section]:
+) -> dict[str, Any]:
     """The valid tables by name. Raises ConfigError with one line for each thing wrong.
 
     recorded: the source describes a run that exists, which stays readable where a new run with its

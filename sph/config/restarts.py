@@ -37,7 +37,9 @@ class Change(NamedTuple):
 
 def class_of(section: type[Section], key: str) -> str | None:
     """The name in CLASSES of a key of that table, None where it is not declared."""
-    return (section.model_fields[key].json_schema_extra or {}).get("restart", section.restart)
+    declared = section.model_fields[key].json_schema_extra
+    found = declared.get("restart") if isinstance(declared, dict) else None
+    return section.restart if found is None else str(found)
 
 
 def changes(before, after) -> list[Change]:

@@ -121,9 +121,12 @@ class RunDirectory:
 
     def checkpoints(self) -> list[Path]:
         """The checkpoints that are there, by number."""
-        found = self._checkpoint_directory.iterdir()
-        named = [path for path in found if checkpoint_number(path) is not None]
-        return sorted(named, key=checkpoint_number)
+        return list(self._numbered().values())
+
+    def _numbered(self) -> dict[int, Path]:
+        """The checkpoints by number, in order."""
+        found = [(checkpoint_number(path), path) for path in self._checkpoint_directory.iterdir()]
+        return dict(sorted((number, path) for number, path in found if number is not None))
 
     @property
     def has_failed(self) -> bool:
@@ -171,17 +174,17 @@ class RunDirectory:
         replaces. A damaged one is no obstacle.
         """
         same_run.check_configuration(self.config, state)
-        number = checkpoint_number(path)
+        number = checkpoint_number(path) or 0
         if number or self.history.exists():  # the first may be a copy that no run went on from yet
             same_run.check_history(self.history, state)
-        numbers = {checkpoint_number(one): one for one in self.checkpoints()}
-        for other in sorted((one for one in numbers if one < number), reverse=True):
+        numbers = self._numbered()
+        for other in reversed([one for one in numbers if one < number]):
             with suppress(Damaged):
                 before = checkpoint.read(numbers[other])
                 same_run.check_order(numbers[other], path, before, state)
                 break
         stays = into is None or is_same_path(into, self.path)
-        for other in sorted(one for one in numbers if one > number and stays):
+        for other in [one for one in numbers if one > number and stays]:
             with suppress(Damaged):
                 after = checkpoint.read(numbers[other])
                 same_run.check_order(path, numbers[other], state, after)
@@ -190,8 +193,8 @@ class RunDirectory:
     def drop_checkpoints_after(self, number: int) -> None:
         """Remove later checkpoints, and what a killed run left unfinished. Raises FileError."""
         with explained(f"cannot remove checkpoints of {self.path}"):
-            for path in self.checkpoints():
-                if checkpoint_number(path) > number:
+            for other, path in self._numbered().items():
+                if other > number:
                     path.unlink()
             self._remove_unfinished()
 

@@ -89,8 +89,9 @@ class Problem(Section):
     @property
     def boundaries(self) -> tuple[str, ...]:
         """The boundary of each axis."""
-        one = isinstance(self.boundary, str)
-        return (self.boundary,) * self.dimension if one else tuple(self.boundary)
+        if isinstance(self.boundary, str):
+            return (self.boundary,) * self.dimension
+        return tuple(self.boundary)
 
     @property
     def centre(self) -> np.ndarray:

@@ -95,7 +95,7 @@ class Problem(base.Problem):
         around = around[:, self._distance(around) >= self.radius]
         cloud = self._cloud(mass)
         position = np.hstack([cloud, around])
-        state = self.exact(eos, 0.0, position)
+        state = self.exact(eos, 0.0, position) or {}
         each = np.full(position.shape[1], mass)
         return base.InitialState(position, state["velocity"], each, state["internal_energy"])
 

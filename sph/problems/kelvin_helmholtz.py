@@ -73,7 +73,7 @@ class Problem(base.Problem):
         return {"mode_amplitude": mode_amplitude(particles, x, y, outward, WAVELENGTH)}
 
     def report(self, eos, time: float, particles, pressure) -> dict[str, float]:
-        return self.diagnostics(particles) | {"growth_time": TAU}
+        return self.diagnostics(particles) | {"growth_time": float(TAU)}
 
 
 def _perturbation(x: np.ndarray, y: np.ndarray) -> np.ndarray:

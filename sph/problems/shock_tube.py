@@ -4,7 +4,7 @@ Sod (1978), J. Comput. Phys. 27, 1, for the best-known states; any others, along
 """
 
 import math
-from typing import Annotated, ClassVar, Literal, NamedTuple
+from typing import Annotated, Any, ClassVar, Literal, NamedTuple
 
 import numpy as np
 from pydantic import Field, field_validator, model_validator
@@ -169,7 +169,7 @@ class Problem(base.Problem):
             xi = (position[0] - self.discontinuity) / time
             density, velocity[0], pressure = riemann.solve(*self._states(), eos, xi)
         else:
-            density, velocity[0], pressure = self._undisturbed(position)
+            density, velocity[0], pressure = self._undisturbed(position)  # type: ignore[assignment]
         in_gas = np.where(density > 0.0, density, 1.0)  # vacuum has no internal energy
         return {
             "density": density,
@@ -244,10 +244,11 @@ class Problem(base.Problem):
         )  # fmt: skip
 
     def _states(self) -> tuple[riemann.State, riemann.State]:
-        return tuple(
+        left, right = (
             riemann.State(gas.density, gas.velocity, gas.pressure)
             for gas in (self.left, self.right)
         )
+        return left, right
 
     def _ends(self, eos) -> _ends.Ends:
         """The waves from the ends of x."""
@@ -256,9 +257,8 @@ class Problem(base.Problem):
     def _undisturbed(self, position: np.ndarray) -> riemann.State:
         """Density, velocity along x and pressure (N,) at t = 0."""
         is_left = position[0] < self.discontinuity
-        return riemann.State(
-            *(np.where(is_left, *pair) for pair in zip(*self._states(), strict=True))
-        )
+        fields: Any = (np.where(is_left, *pair) for pair in zip(*self._states(), strict=True))
+        return riemann.State(*fields)
 
     def _sides(self) -> tuple[Side, Side, np.ndarray]:
         """Both sides, and the mass (2,) of a particle of either: what it holds shared by all.

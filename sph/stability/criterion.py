@@ -186,8 +186,7 @@ class Judge:
 
     @staticmethod
     def _numbers(summary: Summary) -> dict[str, float]:
-        report = summary["report"] or {}
-        return {name: NONE if value is None else value for name, value in report.items()}
+        return summary["report"] or {}
 
     def _largest_errors(self) -> dict[str, float]:
         """The largest L1 error that a stable run has, by field."""
@@ -195,7 +194,7 @@ class Judge:
         if not self.has_exact:
             return {name: self.criterion.deviation * size for name, size in sizes.items()}
         growth, negligible = self.criterion.error_growth, self.criterion.negligible
-        fields = self.summary["errors"]["fields"]
+        fields = self.summary["errors"]["fields"] if self.summary["errors"] else {}
         return {
             name: max(growth * norm["L1"], negligible * sizes[name])
             for name, norm in fields.items()

@@ -54,9 +54,12 @@ class Bound(Section):
         low, high = self.at_least, self.at_most
         if low is not None and high is not None:
             return abs(2.0 * value - (high + low)) / (high - low)
-        size, bound = (high, value) if low is None else (value, low)
         # a share means something where both are above zero
-        return bound / size if min(size, bound) > 0.0 else float(not self.holds(value))
+        if high is not None and min(high, value) > 0.0:
+            return value / high
+        if low is not None and min(low, value) > 0.0:
+            return low / value
+        return float(not self.holds(value))
 
     def __str__(self) -> str:
         low = "" if self.at_least is None else f"at least {self.at_least:g}"

@@ -12,8 +12,10 @@ change.FIELD               largest |last - first| of a particle, over its own fi
                            scalars, over the largest first length for vectors
 """
 
+from collections.abc import Callable, Mapping
 from functools import cached_property
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -32,7 +34,12 @@ KINDS = (
 )  # fmt: skip
 NONE = float("nan")  # the value of a figure that a run does not have
 
-OF_HISTORY = {"first": lambda x: x[0], "last": lambda x: x[-1], "min": np.min, "max": np.max}
+OF_HISTORY: dict[str, Callable[[np.ndarray], Any]] = {
+    "first": lambda x: x[0],
+    "last": lambda x: x[-1],
+    "min": np.min,
+    "max": np.max,
+}
 OF_STATE = {"min": np.min, "max": np.max}
 
 
@@ -41,12 +48,12 @@ class Figures:
 
     def __init__(self, directory: Path, summary: Summary | None):
         self.run = RunDirectory(directory)
-        self.summary = summary
+        self.summary: Mapping[str, Any] = summary or {}
 
     def value(self, name: str) -> float:
         """The figure of that name, NaN where this run has none. Raises FileError."""
         kind, *rest = name.split(".")
-        makers = {
+        makers: dict[str, Callable[..., Any]] = {
             "errors": self._error, "relative": self._relative, "history": self._of_history,
             "state": self._of_state, "change": self._change, "warnings": self._warnings,
         }  # fmt: skip
@@ -90,12 +97,12 @@ class Figures:
         problem, position = state.config.problem, state.particles.position
         if truth.left_out(state.config, state.time, position):
             return NONE
-        exact = problem.exact(eos, state.time, position)[field]
+        exact = (problem.exact(eos, state.time, position) or {})[field]
         inside, _ = truth.region(problem, eos, state.time, position)
         with np.errstate(divide="ignore", invalid="ignore"):
             difference = (state.field(field) - exact) / np.abs(_length(exact))
         volume = state.particles.mass / state.particles.density
-        return norms(difference[..., inside], volume[inside])[norm]
+        return lookup(norms(difference[..., inside], volume[inside]), norm)
 
 
 def _length(values: np.ndarray) -> np.ndarray:

@@ -1,6 +1,7 @@
 """Judge the runs of a case: what passes, what falls short, what fails as its file says."""
 
 from dataclasses import dataclass
+from typing import Any
 
 from sph.analysis.report.runs import Row
 from sph.analysis.report.runs import read as read_runs
@@ -43,7 +44,7 @@ class Result:
     reason: str  # in words; empty for a pass
     checks: tuple[Check, ...]
     reaches: dict[str, float]
-    numbers: dict[str, float | int | str]
+    numbers: dict[str, Any]
 
     @property
     def name(self) -> str:

@@ -66,7 +66,7 @@ def error_against_number(report: Report) -> Figure:
 
 def _figure(report: Report, x, label: str, note: Callable[[Series], str], slopes, under=None):
     """One panel with its legend below, or a panel for each sweep with legends within."""
-    sweeps = {line.sweep: [] for line in report.series}
+    sweeps: dict[str, list[Series]] = {line.sweep: [] for line in report.series}
     for line in report.series:
         sweeps[line.sweep].append(line)
     several = len(sweeps) > 1
@@ -127,7 +127,7 @@ def _error_label(report: Report) -> str:
 
 
 def _title(report: Report) -> str:
-    problems = sorted({row.summary["problem"].replace("_", " ") for row in report.rows})
+    problems = sorted({row.ended["problem"].replace("_", " ") for row in report.rows})
     dimension = _dimension(report)
     return ", ".join(problems) + (f", {dimension}-D" if dimension else "")
 
@@ -223,5 +223,5 @@ def _legend_below(picture: Figure, panel) -> None:
 
 def _dimension(report: Report) -> int | None:
     """That of all runs, or None where they differ."""
-    found = {row.summary["dimension"] for row in report.rows}
+    found = {row.ended["dimension"] for row in report.rows}
     return found.pop() if len(found) == 1 else None

@@ -52,6 +52,6 @@ def _bar_labels(report: Report, line: Series):
 
 def _seconds(row) -> dict[str, float]:
     """CPU seconds of the last session by phase."""
-    session = row.summary["cost"]["session"]
+    session = row.ended["cost"]["session"]
     found = {name: s for name, s in session["phases_cpu_seconds"].items() if name != STARTING}
     return found | {"other": max(0.0, session["cpu_seconds"] - sum(found.values()))}

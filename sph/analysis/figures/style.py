@@ -4,6 +4,7 @@ import io
 import math
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any, Literal
 
 import matplotlib
 import numpy as np
@@ -31,7 +32,7 @@ MOST_DECADES = 4
 PALETTE = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
 EXACT = "black"
 
-SETTINGS = {
+SETTINGS: dict[Any, Any] = {
     "font.family": "STIXGeneral",
     "mathtext.fontset": "stix",
     "font.size": 11,
@@ -62,7 +63,11 @@ def paper():
         yield
 
 
-def new_figure(width: float, height: float, layout: str = "constrained") -> Figure:
+def new_figure(
+    width: float,
+    height: float,
+    layout: Literal["constrained", "compressed"] = "constrained",
+) -> Figure:
     """An empty figure of that size in inches, which belongs to no window."""
     return Figure(figsize=(width, height), dpi=DPI, layout=layout)
 

@@ -40,6 +40,12 @@ class Row:
         self.cost = _cost(self.summary) if self.summary else {}
 
     @property
+    def ended(self) -> Summary:
+        """The summary of a run that has ended, as all runs with an error have."""
+        assert self.summary is not None
+        return self.summary
+
+    @property
     def is_restarted(self) -> bool:
         """Whether its wall-clock seconds contain the start of earlier sessions."""
         return self.summary is not None and self.summary["cost"]["session"]["steps"] < self.steps

@@ -84,7 +84,7 @@ def _cells(report: Report) -> list[list[str]]:
         line = [row.sweep] if several else []
         line += [*(row.value(key) for key in shown), str(row.n), str(row.steps)]
         line += [] if question.cost == "n" else [f"{report.cost[i]:.3g}"]
-        drift = row.summary["conservation"]["energy_drift_max"]
+        drift = row.ended["conservation"]["energy_drift_max"]
         against = "front" if report.on_front[i] else f"× {report.excess[i]:.2f}"
         line += [f"{report.error[i]:.3g}", f"{drift:.1e}", against]
         lines.append([*line, ", ".join(row.warnings) or "–"] if warned else line)

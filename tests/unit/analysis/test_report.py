@@ -97,7 +97,7 @@ def write_run(path, error, cpu, overrides=(), status="done", **changes):
         "errors": norms and {"region": "all", "particles": n, "fields": {"density": norms}},
         "errors_left_out": None, "nearest": None, "warnings": [], "lineage": [],
         "settings_changed": [], "version": "0", "compiled_in": [], "left_out": [],
-        "report": {"radius_error": -error if error else None},
+        "report": {"radius_error": -error if error else 0.0},
         "conservation": {"energy_drift": -1e-5, "energy_drift_max": 2e-5, "momentum_change": None,
                          "energy_injected": 0.0, "volume_ratio": None, "volume_ratio_worst": None},
         "cost": {"cpu_seconds": cpu, "wall_seconds": cpu / 2 + 11.0, "threads": 2,
@@ -342,7 +342,7 @@ def test_a_run_that_stopped_or_failed_is_not_compared_though_it_has_errors(study
 
 
 def test_only_sizes_of_numbers_above_zero_are_errors(tmp_path):
-    figures = {"negative": -2.0, "zero": 0.0, "true": True, "word": "nan", "none": None}
+    figures = {"negative": -2.0, "zero": 0.0, "true": True, "word": "nan"}
     (row,) = runs.read([write_run(tmp_path / "run", 0.1, 1.0, report=figures)])
     found = {name: row.error(f"report.{name}", "L1") for name in figures}
     assert found == dict.fromkeys(figures) | {"negative": 2.0}
