@@ -8,9 +8,10 @@ from typing import Annotated, ClassVar, Literal
 import numpy as np
 from pydantic import Field
 
-from sph.lattice import grid, unit_cell
 from sph.problems import base
-from sph.problems.kelvin_helmholtz_smooth import mode_amplitude, only
+from sph.problems.base import only
+from sph.problems.support.lattice import grid, unit_cell
+from sph.problems.support.shear_mode import mode_amplitude
 
 _SHARED = base.Problem.model_fields
 

@@ -8,11 +8,13 @@ measured in the same way: that velocity is no eigenmode, and its amplitude first
 from typing import Annotated, ClassVar, Literal
 
 import numpy as np
-from pydantic import AfterValidator, Field
+from pydantic import Field
 
 from sph.exact import kelvin_helmholtz as linear
-from sph.lattice import fill
 from sph.problems import base
+from sph.problems.base import only
+from sph.problems.support.lattice import fill
+from sph.problems.support.shear_mode import mode_amplitude, surface_weight
 
 _SHARED = base.Problem.model_fields
 
@@ -26,17 +28,6 @@ PERTURBATION = 0.01  # amplitude of the velocity along y
 # the ramp is wide.
 GROWTH = (0.5, 1.0)
 POINTS = 128  # of linear theory across the layers: its growth rate is known to 0.1 %
-
-
-def only(domain: list[float]) -> AfterValidator:
-    """Annotates the domain of a problem that is set up for no other."""
-
-    def check(given):
-        if given not in (domain, [domain, domain]):
-            raise ValueError(f"this problem is set up for {domain} along both axes only")
-        return given
-
-    return AfterValidator(check)
 
 
 class Problem(base.Problem):
@@ -96,7 +87,7 @@ class Problem(base.Problem):
         start = np.zeros((3, POINTS), dtype=complex)
         start[1] = -1j * PERTURBATION  # sin(kx) is the real part of -i e^(ikx)
         upward = linear.evolution(layer, wavenumber, start, times)[:, 1]
-        weight = _surface_weight(y - 0.5, wavenumber)
+        weight = surface_weight(y - 0.5, wavenumber)
         return {"mode_amplitude": np.abs(upward @ weight) / weight.sum()}
 
     def over_time(self, eos, history: dict[str, np.ndarray]) -> dict[str, float]:
@@ -117,23 +108,6 @@ class Problem(base.Problem):
             "linear_growth_rate": by_theory,
             "growth_ratio": measured / by_theory,
         }
-
-
-def mode_amplitude(particles, x, height, velocity, wavelength: float) -> float:
-    """Amplitude of the mode of that wavelength along x in `velocity` (N,) (eqs 10-13).
-
-    `height` (N,) is y above the middle of the slab, whose faces are at heights of +-1/4. Particles
-    weigh by their volume and by their distance from the nearer face, as a surface mode decays.
-    """
-    wavenumber = 2.0 * np.pi / wavelength
-    weight = particles.mass / particles.density * _surface_weight(height, wavenumber)
-    sine = (weight * velocity * np.sin(wavenumber * x)).sum()
-    cosine = (weight * velocity * np.cos(wavenumber * x)).sum()
-    return float(2.0 * np.hypot(sine, cosine) / weight.sum())
-
-
-def _surface_weight(height: np.ndarray, wavenumber: float) -> np.ndarray:
-    return np.exp(-wavenumber * np.abs(np.abs(height) - 0.25))
 
 
 def _growth(t: np.ndarray, amplitude: np.ndarray) -> float:

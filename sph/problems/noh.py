@@ -9,15 +9,13 @@ from typing import Annotated, ClassVar, Literal
 import numpy as np
 from pydantic import Field, model_validator
 
-from sph import lattice as placement
 from sph.exact import noh
 from sph.problems import base
+from sph.problems.support import lattice as placement
 
 _SHARED = base.Problem.model_fields
 
 DENSITY = SPEED = 1.0
-# Volume of a cube of side 2 over that of the ball in it
-CUBE_OVER_BALL = (1.0, 4.0 / np.pi, 6.0 / np.pi)
 # The gas ends at radius R - t, where the density sum lacks neighbours: errors are taken up to 7/8
 # of that. It is .35 at t = 0.6, as in the comparisons of codes.
 KEPT = 0.875
@@ -101,7 +99,7 @@ class Problem(base.Problem):
 
     def initial(self, eos) -> base.InitialState:
         """What lies within R of the origin of a lattice of particles of one mass."""
-        in_box = self.n * CUBE_OVER_BALL[self.dimension - 1]
+        in_box = self.n * placement.CUBE_OVER_BALL[self.dimension - 1]
         even = self.boundary == "open"  # no particle at the origin, which would fall nowhere
         position = placement.fill(self.box, max(1, round(in_box)), self.lattice, even=even)
         volume = np.prod(self.box[:, 1] - self.box[:, 0]) / position.shape[1]

@@ -9,10 +9,11 @@ from typing import Annotated, Any, ClassVar, Literal, NamedTuple
 import numpy as np
 from pydantic import Field, field_validator, model_validator
 
-from sph import lattice as placement
 from sph.eos import is_gamma_law
 from sph.exact import riemann
-from sph.problems import _ends, _tube_figures, base
+from sph.problems import base
+from sph.problems.support import boundary_waves, tube_figures
+from sph.problems.support import lattice as placement
 
 _SHARED = base.Problem.model_fields
 
@@ -188,7 +189,7 @@ class Problem(base.Problem):
         """Unless vacuum opens at the diaphragm or at an end."""
         states = self._states()
         apart = not is_gamma_law(eos) or riemann.star_state(*states, eos).vacuum
-        return not (apart or _ends.opens_vacuum(self.boundaries[0], *states, eos))
+        return not (apart or boundary_waves.opens_vacuum(self.boundaries[0], *states, eos))
 
     def undisturbed(self, eos, time: float) -> np.ndarray:
         found = super().undisturbed(eos, time)
@@ -235,8 +236,8 @@ class Problem(base.Problem):
         region, _ = self.error_region(eos, time, particles.position)
         low, high = self.undisturbed(eos, time)[0]
         region &= (low < particles.position[0]) & (particles.position[0] < high)
-        return _tube_figures.of(
-            _tube_figures.Tube(
+        return tube_figures.of(
+            tube_figures.Tube(
                 self._states(), eos, time, particles.position[0] - self.discontinuity, region,
                 particles.density, particles.velocity[0], pressure, particles.internal_energy,
                 particles.mass, exact,
@@ -250,9 +251,9 @@ class Problem(base.Problem):
         )
         return left, right
 
-    def _ends(self, eos) -> _ends.Ends:
+    def _ends(self, eos) -> boundary_waves.Ends:
         """The waves from the ends of x."""
-        return _ends.of(self.boundaries[0], *self._states(), eos)
+        return boundary_waves.of(self.boundaries[0], *self._states(), eos)
 
     def _undisturbed(self, position: np.ndarray) -> riemann.State:
         """Density, velocity along x and pressure (N,) at t = 0."""
