@@ -108,10 +108,6 @@ class RunDirectory:
         return self.path / "figures"
 
     @property
-    def diagnostics(self) -> Path:
-        return self.path / "diagnostics"
-
-    @property
     def _checkpoint_directory(self) -> Path:
         return self.path / "checkpoints"
 
@@ -264,9 +260,8 @@ class RunDirectory:
                 f"{self.path} holds a run already.\nTry: --force to replace it, "
                 f"`sph restart {quoted(self.path)}` to go on with it, or another directory with -o."
             )
-        for tree in (self.figures, self.diagnostics):
-            if tree.is_dir() and not tree.is_symlink():
-                shutil.rmtree(tree)
+        if self.figures.is_dir() and not self.figures.is_symlink():
+            shutil.rmtree(self.figures)
         for path in (self.history, self.summary, self.offenders, *self.checkpoints()):
             path.unlink(missing_ok=True)
         self.write_config("")  # its mark stays: beside a user's files this is still a run directory

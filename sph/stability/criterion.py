@@ -1,4 +1,4 @@
-"""When a run is stable: by its status, errors, energy and limits, beside a run of small steps."""
+"""When a run is stable: its status, errors, energy and limits, against a run with small steps."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -19,7 +19,7 @@ NONE = float("nan")
 
 
 class Criterion(NamedTuple):
-    """What a run must keep to be called stable; every default stands here alone."""
+    """The criteria of stability; every default stands here alone."""
 
     # C of the reference run, as a part of the configuration's: errors of the step fall as C^2, so
     # that what a quarter leaves of them is small beside what error_growth allows.
@@ -56,7 +56,7 @@ ABOVE_ONE = ("error_growth", "resolution")
 
 @dataclass(frozen=True)
 class Trial:
-    """A run at a value of the key, and what came of it."""
+    """A run at a value of the key, and its verdict."""
 
     value: float
     name: str  # its directory
@@ -75,10 +75,10 @@ class Trial:
 
 
 class Judge:
-    """Judges runs beside a reference run of the same particles."""
+    """Judges runs against a reference run of the same particles."""
 
     def __init__(self, reference: Path, criterion: Criterion, holds_report: bool = True):
-        """Raises NumericalError where the reference itself came to no end, FileError.
+        """Raises NumericalError where the reference run itself failed, and FileError.
 
         holds_report: whether figures of the report must be the reference's where nothing is exact.
         """
@@ -103,7 +103,7 @@ class Judge:
         return self.summary["errors"] is not None
 
     def trial(self, value: float, directory: Path) -> Trial:
-        """The trial whose run, ended, is in `directory`. Raises FileError."""
+        """The trial from the run in `directory`, which has ended. Raises FileError."""
         summary = RunDirectory(directory).whole_summary()
         drift = summary["conservation"]["energy_drift_max"]
         numbers = (drift, summary["time"], summary["steps"], summary["cost"]["cpu_seconds"])
@@ -131,7 +131,7 @@ class Judge:
         )  # fmt: skip
 
     def in_words(self) -> str:
-        """What runs are held to."""
+        """The criteria, in words."""
         if self.has_exact:
             errors = (
                 f"L1 errors of all fields at most {self.criterion.error_growth:g} times those at "
@@ -234,7 +234,7 @@ def _sizes(state: Checkpoint) -> dict[str, float]:
 
 
 def _closeness(value: float) -> float:
-    """`value` to compare by, with what is no number farthest."""
+    """`value` as a sort key: NaN counts as infinite."""
     return value if value == value else float("inf")
 
 

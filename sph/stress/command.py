@@ -1,7 +1,7 @@
 """The stress suite from its command line to its closing words.
 
-Each case is a sweep in a directory of its own, whose points are the case's settings: they share one
-pool of processes, and what is done is not done again.
+Each case is a sweep in a directory of its own; its points are the settings of the case. All points
+share one pool of processes. Runs that have ended are not repeated.
 """
 
 import tempfile
@@ -21,7 +21,7 @@ from sph.sweep.task import Outcome, Task, tasks
 
 
 class Suite:
-    """Cases in a directory, and the task of each of their settings."""
+    """Cases in a directory, and a task for each setting of each case."""
 
     def __init__(self, cases: Sequence[Case], directory: Path):
         self.cases = list(cases)
@@ -45,10 +45,10 @@ class Suite:
 def run(
     only: Sequence[str], directory: Path, jobs: int | None = None
 ) -> tuple[Suite, list[Result]]:
-    """Bring the cases of these names to their end and judge them; writes stress.json and .md.
+    """Run the cases of these names and judge them; writes stress.json and stress.md.
 
-    Raises ConfigError before anything runs, FileError also where a run could not write, and Stopped
-    where one was stopped.
+    Raises ConfigError before any run starts, FileError also where a run could not write a file, and
+    Stopped where a run was stopped.
     """
     suite = Suite(load(only), directory)
     missing = [task for _, _, task in suite.runs.values() if not _has_ended(task)]
@@ -61,8 +61,8 @@ def run(
         raise FileError(told.unwritten)
     if told.stopped:
         raise Stopped(
-            f"{told.stopped} of {len(suite.runs)} runs have not ended; the same command goes on "
-            "with them."
+            f"{told.stopped} of {len(suite.runs)} runs have not ended; the same command continues "
+            "them."
         )
     results = suite.results()
     with explained(f"cannot write to {directory}"):
@@ -102,5 +102,5 @@ def _prepare(sweep: SweepDirectory, case: Case, plan: Plan) -> None:
 
 
 def _has_ended(task: Task) -> bool:
-    """Whether a run is done or came to numbers that mean nothing, which is a result too."""
+    """Whether a run is done, or failed: a numerical failure is a result too."""
     return task.status in ("done", "failed")

@@ -1,13 +1,13 @@
-"""Figures of a run that limits are set on, each by a name of parts between dots.
+"""Figures of a run that limits may name; parts of a name stand between dots.
 
-errors.FIELD.NORM          as the summary has them: against the exact solution, where it holds
-relative.FIELD.NORM        the same, of (value - exact)/|exact| of each particle
-report.NAME                figures of the problem
+errors.FIELD.NORM          as in the summary: against the exact solution, where it holds
+relative.FIELD.NORM        norm of (value - exact)/|exact| of each particle
+report.NAME                figures of the problem, as in the summary
 nearest.KIND               distance to the nearest neighbour, in spacings; KIND is median, smallest
 conservation.NAME, cost.NAME, steps, particles, time
 history.COLUMN.KIND        over all steps; KIND is first, last, min or max
 state.FIELD.KIND           over the particles at the end; KIND is min or max
-warnings.KIND              how many warnings of that kind the run ended with
+warnings.KIND              1 where the run ended with a warning of that kind, else 0
 change.FIELD               largest |last - first| of a particle, over its own first value for
                            scalars, over the largest first length for vectors
 """
@@ -44,14 +44,14 @@ OF_STATE = {"min": np.min, "max": np.max}
 
 
 class Figures:
-    """Figures of the run in a directory that has ended, each worked out when it is asked for."""
+    """Figures of the run in a directory, each computed when it is asked for."""
 
     def __init__(self, directory: Path, summary: Summary | None):
         self.run = RunDirectory(directory)
         self.summary: Mapping[str, Any] = summary or {}
 
     def value(self, name: str) -> float:
-        """The figure of that name, NaN where this run has none. Raises FileError."""
+        """The figure of that name; NaN where the run has no such figure. Raises FileError."""
         kind, *rest = name.split(".")
         makers: dict[str, Callable[..., Any]] = {
             "errors": self._error, "relative": self._relative, "history": self._of_history,
