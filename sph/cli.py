@@ -4,9 +4,9 @@ import signal
 import sys
 
 if __name__ == "__main__":  # python -m sph.cli: install signal handlers before the slow imports
-    from sph.__main__ import main
+    from sph.__main__ import main as program
 
-    sys.exit(main())
+    sys.exit(program())
 
 from pathlib import Path
 

@@ -1,12 +1,19 @@
-"""What a run costs: CPU seconds by phase, with compilation counted apart."""
+"""What a run costs, in time. What the words mean is defined in `sph.summary`."""
 
 import time
 
 from numba.core import event
 
+# The phase in which Numba fills its tables, on first use. It is no part of `Clock.cpu`.
+STARTING = "start of Numba"
+
 
 class Clock(event.Listener):
-    """CPU seconds (user + system, all threads) by phase; compilation is a phase of its own."""
+    """CPU seconds of a session and its phases; compilation and the start of Numba are apart.
+
+    seconds: of each phase, without compilation; `STARTING` is one of them.
+    compiling: CPU time (user + system, all threads) of compilation.
+    """
 
     def __init__(self):
         self.seconds: dict[str, float] = {}
@@ -35,18 +42,19 @@ class Clock(event.Listener):
             self.compiling += time.process_time() - self._began
 
     def phase(self, name: str) -> "Phase":
-        """Count the time inside under `name`, less what was spent compiling."""
+        """Add the CPU time of a `with` block to the phase `name`, without compilation."""
         return Phase(self, name)
 
     @property
     def wall(self) -> float:
-        """Wall-clock seconds since the clock was made."""
+        """Wall-clock seconds since the clock was made, with compilation and the start of Numba."""
         return time.perf_counter() - self.wall_start
 
     @property
     def cpu(self) -> float:
-        """CPU seconds since the clock was made, compilation included."""
-        return time.process_time() - self.cpu_start
+        """CPU seconds since the clock was made: without compilation and the start of Numba."""
+        apart = self.compiling + self.seconds.get(STARTING, 0.0)
+        return time.process_time() - self.cpu_start - apart
 
 
 class Phase:

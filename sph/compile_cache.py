@@ -37,7 +37,7 @@ DIGEST = hashlib.sha256().digest_size
 def install() -> None:
     """Make Numba use this cache for functions that are compiled with cache=True from now on."""
     directory()  # before the modules are imported whose sources it is named by
-    dispatcher.FunctionCache = _of_function
+    dispatcher.FunctionCache = _of_function  # type: ignore[attr-defined]
 
 
 def place() -> Path | None:
@@ -75,7 +75,8 @@ class Directory:
     def descriptor(self) -> int | None:
         """Descriptor of the directory, under a shared lock until the process ends, or None."""
         if self.path is None or not fingerprint.facts()["sources of sph"]:
-            return self._refuse("there is no home directory, or there are no source files of sph")
+            self._refuse("there is no home directory, or there are no source files of sph")
+            return None
         try:
             is_new = not self.path.is_dir()
             if is_new:
@@ -83,16 +84,22 @@ class Directory:
                 self.path.mkdir(0o700, exist_ok=True)
             opened = os.open(self.path, os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW)
         except OSError as error:
-            return self._refuse(error.strerror)
+            self._refuse(error.strerror)
+            return None
         if danger := _danger(os.fstat(opened)):
             os.close(opened)
-            return self._refuse(danger)
+            self._refuse(danger)
+            return None
         with suppress(OSError):  # a file system without locks, or read-only
             fcntl.flock(opened, fcntl.LOCK_SH | fcntl.LOCK_NB)
             os.utime(opened)
         if is_new:
             prune(self.path.parent)
         return opened
+
+    @property
+    def name(self) -> str:
+        return self.path.name if self.path else ""
 
     def read(self, name: str) -> bytes | None:
         """Return the content of an entry, or None if it is missing, damaged or not the user's."""
@@ -138,8 +145,8 @@ class Directory:
                 flush=True,
             )
 
-    def _refuse(self, reason: str) -> None:
-        self.reason = reason
+    def _refuse(self, reason: str | None) -> None:
+        self.reason = reason or "no reason is known"
 
 
 def _danger(status: os.stat_result) -> str | None:
@@ -229,7 +236,7 @@ class Entries(caching._Cache):
     def flush(self): ...
 
     def _whole_key(self, sig, codegen):
-        return directory().path.name, self._key, repr(sig), codegen.magic_tuple()
+        return directory().name, self._key, repr(sig), codegen.magic_tuple()
 
     def _name(self, key) -> str:
         digest = hashlib.sha256(repr(key).encode()).hexdigest()

@@ -3,6 +3,7 @@
 import ast
 import inspect
 import textwrap
+from typing import Any
 
 
 def docstring(thing) -> str:
@@ -16,4 +17,5 @@ def docstring(thing) -> str:
         tree = ast.parse(textwrap.dedent(inspect.getsource(thing)))
     except (OSError, TypeError):  # the source is not available
         return ""
-    return ast.get_docstring(tree if inspect.ismodule(thing) else tree.body[0]) or ""
+    documented: Any = tree if inspect.ismodule(thing) else tree.body[0]
+    return ast.get_docstring(documented) or ""

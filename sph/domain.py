@@ -5,6 +5,7 @@ reflecting wall a sign and an offset. Velocities take the sign. The pair loops k
 """
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import product
@@ -40,7 +41,7 @@ class Domain:
     boundaries: tuple[str, ...]
 
     @property
-    def _axes(self):
+    def _axes(self) -> Iterable[tuple[np.ndarray, str]]:
         return zip(self.box, self.boundaries, strict=True)
 
     @property
@@ -86,7 +87,7 @@ class Domain:
         """Images that have been asked for, by the copies of the box along each axis."""
         return {}
 
-    def bring_inside(self, position, others) -> None:
+    def bring_inside(self, position: np.ndarray, others: Iterable[np.ndarray]) -> None:
         """Wrap periodic axes and reflect at walls, in place.
 
         position (D, N); others: vectors (D, N), whose component changes sign in a reflection, and
@@ -138,7 +139,7 @@ class Domain:
             )
 
 
-def _between_walls(x, lo: float, hi: float):
+def _between_walls(x: np.ndarray, lo: float, hi: float) -> tuple[np.ndarray, np.ndarray]:
     """Where points beyond walls at `lo` and `hi` come to rest, and whether they have turned.
 
     A fast particle may meet walls many times in a step; each second time it goes on as before.

@@ -79,7 +79,9 @@ def smaller_steps(simulation) -> str:
 def held_courant(scene) -> str | None:
     """In words, that the run takes a smaller Courant number than physics.C; None if it does not."""
     held, given = scene.step_bounds.courant, scene.physics.C
-    return None if held == given else f"physics.C = {given:g} is held at {held:.3g} by {_holds(scene)}"
+    return (
+        None if held == given else f"physics.C = {given:g} is held at {held:.3g} by {_holds(scene)}"
+    )
 
 
 def longer_steps(simulation) -> str:

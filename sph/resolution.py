@@ -31,7 +31,7 @@ class Gap(NamedTuple):
     """The position or velocity that float64 resolves worst, compared with its scale."""
 
     kind: str  # "position" or "velocity"
-    index: int  # of the particle in memory order
+    index: int  # type: ignore[assignment]  # of the particle in memory order
     size: float  # distance to the next float64 number
     scale: float  # the particle spacing, or the speed of sound plus the relative velocity
 

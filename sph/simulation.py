@@ -240,4 +240,6 @@ def carried(scene: Scene) -> tuple[str, ...]:
     for one in scene.passes:
         read |= {name for name in one.reads if name not in written}
         written |= set(one.writes)
-    return tuple(field.name for field in scene.fields if field.name in read or field.name not in written)
+    return tuple(
+        field.name for field in scene.fields if field.name in read or field.name not in written
+    )

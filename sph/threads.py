@@ -6,7 +6,9 @@ Each particle is written by exactly one range, so results do not depend on the n
 
 import itertools
 import os
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
+from typing import Any
 
 # Smallest number of blocks in a range. Starting a range in another thread costs about 50
 # microseconds; a pass over 256 blocks of eight particles takes 600 in 1-D and 5000 in 3-D.
@@ -27,7 +29,10 @@ class Team:
         self.threads = threads
         self._pool = ThreadPoolExecutor(threads, "sph") if threads > 1 else None
 
-    def run(self, function, items: int, *arguments, smallest: int = SMALLEST_RANGE) -> None:
+    def run(
+        self, function: Callable[..., None], items: int, *arguments: Any,
+        smallest: int = SMALLEST_RANGE,
+    ) -> None:  # fmt: skip
         """Call function(first, last, *arguments) for ranges that cover [0, items).
 
         No range is shorter than `smallest` items.

@@ -80,9 +80,7 @@ def of(state, parts, keeps_momentum) -> Totals:
         keeps_momentum,
     )  # fmt: skip
     energies = {
-        name: float(s.mass @ each)
-        for part in parts
-        for name, each in part.energies(s).items()
+        name: float(s.mass @ each) for part in parts for name, each in part.energies(s).items()
     }
     return Totals(kinetic, relative, internal, energies, *others)
 

@@ -4,10 +4,11 @@ Each kind is one function below, and one section of docs/warnings.md with an exa
 what was found, which limit it exceeds, and what to try.
 """
 
-from collections.abc import Iterator
-from typing import Any, NamedTuple
+from collections.abc import Iterator, Mapping
+from typing import NamedTuple
 
 from sph import resolution
+from sph.summary import Conservation, Nearest, Summary, figure
 
 # Limit of the stress suite for settings that pass; a larger drift is an error of time integration.
 DRIFT = 1e-3
@@ -29,7 +30,7 @@ class Warning(NamedTuple):
     text: str
 
 
-def of_run(simulation, summary: dict[str, Any]) -> list[Warning]:
+def of_run(simulation, summary: Summary) -> list[Warning]:
     """Return the warnings of a run, from its final state and its summary."""
     problem = simulation.scene.config.problem
     return [
@@ -44,7 +45,7 @@ def of_run(simulation, summary: dict[str, Any]) -> list[Warning]:
     ]
 
 
-def kinds(summary: dict[str, Any]) -> list[str]:
+def kinds(summary: Mapping[str, object]) -> list[str]:
     """Return the kinds of warnings in a summary, each once. Older summaries have no warnings.
 
     Entries of a damaged summary that are not warnings are skipped.
@@ -54,20 +55,7 @@ def kinds(summary: dict[str, Any]) -> list[str]:
     return list(dict.fromkeys(str(one.get("kind")) for one in warned))
 
 
-def figure(summary: dict[str, Any], name: str) -> float | None:
-    """Return a number of the summary on which a problem may set a limit, or None if it is absent.
-
-    name: a key of summary["report"] or summary["conservation"], where "energy_drift" stands for
-    the largest energy drift of any step; or "l1.FIELD", the L1 error of a field.
-    """
-    if name.startswith("l1."):
-        fields = (summary["errors"] or {}).get("fields", {})
-        return fields.get(name.removeprefix("l1."), {}).get("L1")
-    named = summary["conservation"] | (summary["report"] or {})
-    return named.get("energy_drift_max" if name == "energy_drift" else name)
-
-
-def _swamped(problem, summary) -> Iterator[Warning]:
+def _swamped(problem, summary: Summary) -> Iterator[Warning]:
     for name, limit in problem.swamped.items():
         value = figure(summary, name)
         if value is not None and not limit.holds(value):
@@ -78,7 +66,7 @@ def _swamped(problem, summary) -> Iterator[Warning]:
             )
 
 
-def _energy(kept) -> Iterator[Warning]:
+def _energy(kept: Conservation) -> Iterator[Warning]:
     drift = kept["energy_drift_max"]
     if not drift <= DRIFT:
         yield Warning(
@@ -88,7 +76,7 @@ def _energy(kept) -> Iterator[Warning]:
         )
 
 
-def _momentum(kept) -> Iterator[Warning]:
+def _momentum(kept: Conservation) -> Iterator[Warning]:
     change = kept["momentum_change"]
     if change is not None and not change <= MOMENTUM:
         yield Warning(
@@ -99,7 +87,7 @@ def _momentum(kept) -> Iterator[Warning]:
         )
 
 
-def _volume(kept) -> Iterator[Warning]:
+def _volume(kept: Conservation) -> Iterator[Warning]:
     ratio = kept["volume_ratio"]
     if ratio is not None and not abs(ratio - 1.0) <= VOLUME:
         yield Warning(
@@ -126,7 +114,7 @@ def _resolution(simulation) -> Iterator[Warning]:
         yield Warning("resolution", text)
 
 
-def _paired(nearest: dict[str, float] | None) -> Iterator[Warning]:
+def _paired(nearest: Nearest | None) -> Iterator[Warning]:
     if nearest and nearest["median"] < PAIRED:
         yield Warning(
             "paired",
@@ -137,7 +125,7 @@ def _paired(nearest: dict[str, float] | None) -> Iterator[Warning]:
         )
 
 
-def _limits(problem, summary) -> Iterator[Warning]:
+def _limits(problem, summary: Summary) -> Iterator[Warning]:
     for name, limit in problem.allowed().items():
         value = figure(summary, name)
         if value is None or limit.holds(value) or _is_said(name, problem, summary):
@@ -145,7 +133,7 @@ def _limits(problem, summary) -> Iterator[Warning]:
         yield Warning("limit", _beyond(name, value, limit))
 
 
-def _is_said(name: str, problem, summary) -> bool:
+def _is_said(name: str, problem, summary: Summary) -> bool:
     """Return whether another kind of warning already reports that number."""
     if name == "energy_drift":
         return any(_energy(summary["conservation"]))

@@ -103,8 +103,7 @@ class Watchdog:
             raise endless_sum(simulation)
         raise fault(
             simulation,
-            f"the time step fell to {dt:.3g}, too small to advance time: "
-            f"{what_sets(simulation)}",
+            f"the time step fell to {dt:.3g}, too small to advance time: {what_sets(simulation)}",
             longer_steps(simulation),
             simulation.limit.particle,
         )

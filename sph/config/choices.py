@@ -13,6 +13,7 @@ from sph.config.errors import Issue, as_error, explain, wrong_value
 from sph.model import parameters
 from sph.problems.base import Section
 
+
 class Choice:
     """Annotates a key whose value is the name of a file in `package`, such as "sph.kernels"."""
 
@@ -135,9 +136,7 @@ def plain(kind: Any, above: float | None, at_least: float | None, at_most: float
         return kind
     is_union = typing.get_origin(kind) in (types.UnionType, typing.Union)
     branches = typing.get_args(kind) if is_union else (kind,)
-    bounded = (
-        Annotated[one, Field(**bounds)] if one in (int, float) else one for one in branches
-    )
+    bounded = (Annotated[one, Field(**bounds)] if one in (int, float) else one for one in branches)
     return typing.Union[tuple(bounded)]  # noqa: UP007 (a tuple of types)
 
 

@@ -1,6 +1,7 @@
 """The commented configuration that `sph new` prints."""
 
 import textwrap
+from collections.abc import Mapping
 from typing import Any
 
 from pydantic import BaseModel
@@ -10,14 +11,15 @@ from sph.config import restarts
 from sph.config.errors import branches, describe, field_annotation
 from sph.config.toml_text import value_text
 from sph.docstrings import docstring
+from sph.problems.base import Section
 
 
-def text(sections: dict[str, BaseModel]) -> str:
+def text(sections: Mapping[str, Section]) -> str:
     """Return TOML with every key; a comment above each gives its help, bounds and default."""
     return "\n".join(_table(name, section) for name, section in sections.items())
 
 
-def _table(name: str, section: BaseModel) -> str:
+def _table(name: str, section: Section) -> str:
     model = type(section)
     keys = (
         _key(key, field, _help(model, key), getattr(section, key), _restart(model, key))
@@ -33,7 +35,7 @@ def _help(model: type[BaseModel], key: str) -> str:
     return next((field.description for field in fields if field and field.description), key)
 
 
-def _restart(model: type[BaseModel], key: str) -> str:
+def _restart(model: type[Section], key: str) -> str:
     """Return the key's class in a restart, or "" if all keys of its table have the same class."""
     return "" if model.restart else f"in a restart: {restarts.class_of(model, key)}"
 

@@ -129,7 +129,7 @@ def resolve(
     overrides: Sequence[str],
     sections: dict[str, type[Section]],
     recorded: bool = False,
-) -> dict[str, Section]:
+) -> dict[str, Any]:
     """Return the validated tables by name. Raises ConfigError with one line for each error.
 
     recorded: the source is the configuration of an existing run. Such a run stays readable even if

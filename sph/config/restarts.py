@@ -40,7 +40,9 @@ class Change(NamedTuple):
 
 def class_of(section: type[Section], key: str) -> str | None:
     """Return the class (a key of CLASSES) of a key of that table, or None if none is declared."""
-    return (section.model_fields[key].json_schema_extra or {}).get("restart", section.restart)
+    declared = section.model_fields[key].json_schema_extra
+    found = declared.get("restart") if isinstance(declared, dict) else None
+    return section.restart if found is None else str(found)
 
 
 def changes(before, after) -> list[Change]:

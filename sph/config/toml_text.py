@@ -31,7 +31,7 @@ def _tokens(text: str) -> list[_Token]:
     found, line = [], 1
     for match in _TOKEN.finditer(text):
         if match.lastgroup != "blank":
-            found.append(_Token(match.lastgroup, match.group(), line))
+            found.append(_Token(match.lastgroup or "", match.group(), line))
         line += match.group().count("\n")
     found.append(_Token("mark", "\n", line))
     return found
@@ -90,10 +90,11 @@ class _Reader:
     def pair(self, table: Path | None) -> None:
         key, line = self.key()
         self.take()  # =
-        path = None if table is None else table + key
-        if path is not None:
-            self.note(path, len(table), line)
-        self.value(path)
+        if table is None:
+            self.value(None)
+            return
+        self.note(table + key, len(table), line)
+        self.value(table + key)
 
     def value(self, path: Path | None) -> None:
         """Skip a value; note the keys of an inline table unless `path` is None (in an array)."""

@@ -4,11 +4,11 @@ from typing import Annotated, NamedTuple
 
 import numpy as np
 
-from sph.eos import Eos
+from sph.eos import Defaults
 from sph.model import Parameter, model
 
 
-@model(Eos)
+@model(Defaults)
 class IdealGas(NamedTuple):
     """`gamma`: adiabatic index, the ratio of specific heats, above 1."""
 

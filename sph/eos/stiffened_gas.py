@@ -9,11 +9,11 @@ from typing import Annotated, NamedTuple
 
 import numpy as np
 
-from sph.eos import Eos
+from sph.eos import Defaults
 from sph.model import Parameter, model
 
 
-@model(Eos)
+@model(Defaults)
 class StiffenedGas(NamedTuple):
     """`gamma` above 1; `p_inf`, a pressure, at least 0: the gas holds together down to -p_inf.
 

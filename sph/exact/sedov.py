@@ -84,9 +84,11 @@ def solve(
         2.0 / (gamma + 1.0) * shock_speed * inside.velocity * scaled,
         2.0 / (gamma + 1.0) * density * shock_speed**2 * inside.pressure,
     )
-    background = (density, 0.0, background_pressure)
-    return tuple(
-        np.where(radius <= shock, *pair) for pair in zip(interior, background, strict=True)
+    is_inside = radius <= shock
+    return (
+        np.where(is_inside, interior[0], density),
+        np.where(is_inside, interior[1], 0.0),
+        np.where(is_inside, interior[2], background_pressure),
     )
 
 

@@ -4,11 +4,11 @@ import math
 from typing import Annotated, NamedTuple
 
 from sph.compiled import larger
-from sph.kernels import Kernel
+from sph.kernels import Defaults
 from sph.model import Parameter, model
 
 
-@model(Kernel)
+@model(Defaults)
 class CubicSpline(NamedTuple):
     """`flattened`: in the force, keep the gradient below q = 1/3 at its value there.
 

@@ -8,11 +8,11 @@ from types import MappingProxyType
 from typing import NamedTuple
 
 from sph.compiled import larger
-from sph.kernels import Kernel
+from sph.kernels import Defaults
 from sph.model import model
 
 
-@model(Kernel)
+@model(Defaults)
 class QuinticSpline(NamedTuple):
     """No parameters."""
 

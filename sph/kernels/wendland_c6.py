@@ -7,11 +7,11 @@ import math
 from typing import NamedTuple
 
 from sph.compiled import larger
-from sph.kernels import Kernel
+from sph.kernels import Defaults
 from sph.model import model
 
 
-@model(Kernel)
+@model(Defaults)
 class WendlandC6(NamedTuple):
     """No parameters."""
 

@@ -13,6 +13,7 @@ import numpy as np
 from numba import njit
 
 from sph.compiled import COMPILED, larger, smaller
+from sph.domain import Images
 from sph.neighbours import tree
 from sph.neighbours.order import BLOCK
 
@@ -27,8 +28,9 @@ STACK = 27 + 4 * 64
 
 @njit(**COMPILED)
 def first_contact(
-    position, velocity, acceleration, support, identity, images, box_length, dt, reached
-):
+    position: np.ndarray, velocity: np.ndarray, acceleration: np.ndarray, support: np.ndarray,
+    identity: np.ndarray, images: Images, box_length: float, dt: float, reached: float,
+) -> tuple[float, int]:  # fmt: skip
     """(part of dt, particle): where the step must end for the first such pair, and whose it is.
 
     `reached`: how deep, in parts of the smaller support, a pair may come from close to the rim.

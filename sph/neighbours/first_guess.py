@@ -29,7 +29,7 @@ def _spacing(lower, upper, n):
 
 
 @njit(**COMPILED)
-def from_spacing(position, ratio):
+def from_spacing(position: np.ndarray, ratio: float) -> np.ndarray:
     """Supports (N,) for positions (D, N) in block order.
 
     ratio = (H/h) eta times the least spacing of the boxes that hold the particle. (A box that cuts
@@ -56,7 +56,7 @@ def from_spacing(position, ratio):
 
 
 @njit(**COMPILED)
-def trim(position, ratio, least, guess):
+def trim(position: np.ndarray, ratio: float, least: float, guess: np.ndarray) -> None:
     """Halve the guesses (N,) that hold far too many particles, for positions in block order.
 
     None goes below `least`. A support is meant to hold those of a ball of radius `ratio` spacings.

@@ -10,8 +10,10 @@ import numpy as np
 from numba import njit
 
 from sph.compiled import COMPILED, larger, smaller
+from sph.domain import Images
 from sph.neighbours.order import BLOCK, number_of_blocks
-from sph.threads import SMALLEST_RANGE
+from sph.neighbours.tree import Tree
+from sph.threads import SMALLEST_RANGE, Team
 
 CHUNK = 32  # blocks that share a stretch of the storage
 IMAGE_SHIFT = 26  # low bits of a candidate: the particle; above them the image
@@ -23,7 +25,7 @@ class Lists(NamedTuple):
     """Candidates of block b: candidates[start[b] : start[b] + count[b]]."""
 
     start: np.ndarray  # (blocks,) int64
-    count: np.ndarray  # (blocks,) int64
+    count: np.ndarray  # type: ignore[assignment]  # (blocks,) int64, not tuple.count
     candidates: np.ndarray  # int32, int64 where supports are wider than a thin box
 
 
@@ -145,7 +147,10 @@ def _fits(needed, region):
     return fits
 
 
-def build(tree, position, support, skin: float, images, team, room=None):
+def build(
+    tree: Tree, position: np.ndarray, support: np.ndarray, skin: float, images: Images, team: Team,
+    room: np.ndarray | None = None,
+) -> tuple[Lists, np.ndarray]:  # fmt: skip
     """Lists of all blocks, and the room each chunk of them needed.
 
     position (D, N) and support (N,) in block order, `tree` built from them; candidates lie

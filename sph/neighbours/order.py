@@ -9,7 +9,7 @@ import numpy as np
 from numba import njit
 
 from sph.compiled import COMPILED
-from sph.threads import SMALLEST_RANGE
+from sph.threads import SMALLEST_RANGE, Team
 
 BLOCK = 8  # particles a block: 4 or 16 were slower by 20-40 % in 3-D (density, rates and lists)
 
@@ -119,7 +119,7 @@ def _split_subtrees(first_tree, last_tree, position, identity, order, key, level
             _split(position, identity, order, key, a, b, 64)
 
 
-def block_order(position, identity, team):
+def block_order(position: np.ndarray, identity: np.ndarray, team: Team) -> np.ndarray:
     """New order of the particles, (N,) indices; position (D, N), identity (N,), a threads.Team."""
     n = identity.size
     order = np.arange(n)

@@ -6,9 +6,11 @@ import numpy as np
 from numba import njit
 
 from sph.compiled import COMPILED
+from sph.domain import Domain, Images
 from sph.errors import NumericalError
 from sph.neighbours import first_guess, lists, order, tree
 from sph.neighbours.order import BLOCK
+from sph.threads import Team
 
 # Room for supports to grow between two builds. Where it falls short the pass is done once more.
 GROWTH = 0.03
@@ -77,34 +79,35 @@ def best_skin(step: float, dimension: int) -> float:
 class Search:
     """Lists over particles in block order, and how far they can be trusted."""
 
-    def __init__(self, domain, team):
+    def __init__(self, domain: Domain, team: Team):
         self.domain = domain
         self.team = team
-        self.origin = None
-        self.lists = None
-        self.images = None  # that the lists refer to
-        self._room = None
+        self.origin: Origin | None = None
+        self.lists: lists.Lists | None = None
+        self.images: Images | None = None  # that the lists refer to
+        self._room: np.ndarray | None = None  # that each chunk of the lists needed
         self.reach_factor = 0.0  # of the list support: within it candidates are complete
         self._widenings = 0  # of this step
 
-    def stale(self, position, support) -> bool:
+    def stale(self, position: np.ndarray, support: np.ndarray) -> bool:
         """Whether particles have moved so far that the lists may miss a neighbour.
 
         A pair is listed if it was within (1 + skin) of the larger support; each of the two may have
         moved since. Keeps `reach_factor` for the passes.
         """
         self._widenings = 0
-        if self.lists is None:
+        origin = self.origin
+        if self.lists is None or origin is None:
             return True
-        moved, grown = _motion(position, support, self.origin.position, self.origin.support)
-        self.reach_factor = 1.0 + self.origin.skin - 2.0 * moved
+        moved, grown = _motion(position, support, origin.position, origin.support)
+        self.reach_factor = 1.0 + origin.skin - 2.0 * moved
         return not self.reach_factor > grown
 
-    def skin_for(self, velocity, support, dt: float) -> float:
+    def skin_for(self, velocity: np.ndarray, support: np.ndarray, dt: float) -> float:
         """The skin for lists built now, for particles of velocity (D, N) and a step dt."""
         return best_skin(_largest_step(velocity, support, dt), velocity.shape[0])
 
-    def guess(self, position, ratio: float) -> np.ndarray:
+    def guess(self, position: np.ndarray, ratio: float) -> np.ndarray:
         """Supports (N,) to begin with, none so wide that lists cannot serve it."""
         least = 1e-9 * self.domain.largest_side  # where all particles are in one place
         most = min(self.domain.longest_reach / (1 + 2 * GROWTH), self.domain.largest_side)
@@ -112,7 +115,7 @@ class Search:
         first_guess.trim(position, ratio, least, guess)
         return guess
 
-    def order(self, position, identity) -> np.ndarray:
+    def order(self, position: np.ndarray, identity: np.ndarray) -> np.ndarray:
         """The block order of these particles, (N,) indices."""
         if identity.size > lists.MAX_PARTICLES:
             raise NumericalError(
@@ -121,7 +124,7 @@ class Search:
             )
         return order.block_order(position, identity, self.team)
 
-    def build(self, origin: Origin, identity) -> None:
+    def build(self, origin: Origin, identity: np.ndarray) -> None:
         """Build the lists from `origin`, whose arrays are in block order and are kept."""
         largest = int(np.argmax(origin.support))
         self.domain.check_reach(origin.support[largest], identity.size, int(identity[largest]))
@@ -135,11 +138,13 @@ class Search:
         self.origin = origin
         self.reach_factor = 1.0 + origin.skin
 
-    def widen(self, position, wanted, identity) -> None:
+    def widen(self, position: np.ndarray, wanted: np.ndarray, identity: np.ndarray) -> None:
         """List particles where they are now, to `wanted` (blocks,) times the list support."""
+        origin = self.origin
+        assert origin is not None  # lists have been built
         self._widenings += 1
         factor = np.repeat(np.maximum(wanted, 1.0), BLOCK)[: identity.size]
-        support = self.origin.support * factor
+        support = origin.support * factor
         if self._widenings > PATIENCE:
             support = np.where(factor > 1.0, 2.0 * support, support)
-        self.build(Origin(position.copy(), support, self.origin.skin), identity)
+        self.build(Origin(position.copy(), support, origin.skin), identity)

@@ -20,7 +20,7 @@ class Tree(NamedTuple):
 
 
 @njit(**COMPILED)
-def build(position, support):
+def build(position: np.ndarray, support: np.ndarray) -> Tree:
     """Boxes over particles in block order: position (D, N), support (N,)."""
     D, n = position.shape
     blocks = (n + BLOCK - 1) // BLOCK

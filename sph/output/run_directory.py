@@ -29,6 +29,7 @@ from sph.output.files import (
 )
 from sph.output.json_text import json_text
 from sph.shell_words import quoted
+from sph.summary import Summary, of_json
 
 CHECKPOINT_NAME = re.compile(r"checkpoint_(\d{6,})\.h5")
 
@@ -106,10 +107,6 @@ class RunDirectory:
         return self.path / "figures"
 
     @property
-    def diagnostics(self) -> Path:
-        return self.path / "diagnostics"
-
-    @property
     def _checkpoint_directory(self) -> Path:
         return self.path / "checkpoints"
 
@@ -119,9 +116,12 @@ class RunDirectory:
 
     def checkpoints(self) -> list[Path]:
         """Return the existing checkpoints, in order of their numbers."""
-        found = self._checkpoint_directory.iterdir()
-        named = [path for path in found if checkpoint_number(path) is not None]
-        return sorted(named, key=checkpoint_number)
+        return list(self._numbered().values())
+
+    def _numbered(self) -> dict[int, Path]:
+        """Return the existing checkpoints by number, in order."""
+        found = [(checkpoint_number(path), path) for path in self._checkpoint_directory.iterdir()]
+        return dict(sorted((number, path) for number, path in found if number is not None))
 
     @property
     def has_failed(self) -> bool:
@@ -169,17 +169,17 @@ class RunDirectory:
         which it replaces. Damaged checkpoints are ignored.
         """
         same_run.check_configuration(self.config, state)
-        number = checkpoint_number(path)
+        number = checkpoint_number(path) or 0
         if number or self.history.exists():  # the first may be a copy that was not continued yet
             same_run.check_history(self.history, state)
-        numbers = {checkpoint_number(one): one for one in self.checkpoints()}
-        for other in sorted((one for one in numbers if one < number), reverse=True):
+        numbers = self._numbered()
+        for other in reversed([one for one in numbers if one < number]):
             with suppress(Damaged):
                 before = checkpoint.read(numbers[other])
                 same_run.check_order(numbers[other], path, before, state)
                 break
         stays = into is None or is_same_path(into, self.path)
-        for other in sorted(one for one in numbers if one > number and stays):
+        for other in [one for one in numbers if one > number and stays]:
             with suppress(Damaged):
                 after = checkpoint.read(numbers[other])
                 same_run.check_order(path, numbers[other], state, after)
@@ -188,8 +188,8 @@ class RunDirectory:
     def drop_checkpoints_after(self, number: int) -> None:
         """Remove later checkpoints and the unfinished files of a killed run. Raises FileError."""
         with explained(f"cannot remove checkpoints of {self.path}"):
-            for path in self.checkpoints():
-                if checkpoint_number(path) > number:
+            for other, path in self._numbered().items():
+                if other > number:
                     path.unlink()
             self._remove_unfinished()
 
@@ -204,8 +204,21 @@ class RunDirectory:
         """
         write_text(self.summary, json_text(summary))
 
+    def whole_summary(self) -> Summary:
+        """The summary of a run that has ended. Raises FileError where it cannot be read."""
+        try:
+            return of_json(read_text(self.summary))
+        except (OSError, ValueError, RecursionError) as error:
+            raise FileError(
+                f"{self.summary} cannot be read: {error}.\n"
+                "Try: the sph that wrote it; or `sph restart` of its directory, if it is damaged."
+            ) from None
+
     def read_summary(self) -> dict:
-        """Return the content of summary.json, or an empty dictionary if it cannot be read."""
+        """Return the content of summary.json, or an empty dictionary if it cannot be read.
+
+        For the status of a run that may not have ended; `whole_summary` has the figures.
+        """
         try:
             found = json.loads(read_text(self.summary))
         except (OSError, FileError, ValueError, RecursionError):
@@ -246,9 +259,8 @@ class RunDirectory:
                 f"{self.path} already holds a run.\nTry: --force to replace it, "
                 f"`sph restart {quoted(self.path)}` to continue it, or another directory, with -o."
             )
-        for tree in (self.figures, self.diagnostics):
-            if tree.is_dir() and not tree.is_symlink():
-                shutil.rmtree(tree)
+        if self.figures.is_dir() and not self.figures.is_symlink():
+            shutil.rmtree(self.figures)
         for path in (self.history, self.summary, self.offenders, *self.checkpoints()):
             path.unlink(missing_ok=True)
         self.write_config("")  # keeps MARK, so that this remains a run directory

@@ -133,7 +133,9 @@ def _axes(group: h5py.Group, version: int) -> tuple[dict[str, int], set[str]]:
 def fields_of(text: str) -> dict[str, tuple[int, bool]]:
     """Return rank, and whether it may be missing, of each field named in `fields`. Raises Refused."""
     try:
-        found = {name: (int(rank), bool(remade)) for name, (rank, remade) in json.loads(text).items()}
+        found = {
+            name: (int(rank), bool(remade)) for name, (rank, remade) in json.loads(text).items()
+        }
     except (ValueError, TypeError, AttributeError, RecursionError):
         raise Refused("foreign", "its list of fields is not one") from None
     reserved = {*SCALARS, *ENERGIES, *LISTS}

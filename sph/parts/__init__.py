@@ -13,8 +13,7 @@ from sph.part import Part
 def classes(formulation: str) -> tuple[type[Part], ...]:
     """The parts that can join that formulation, in the order of their names."""
     found = (
-        registry.part_class("sph.parts", name)
-        for name in registry.names("sph.parts", folders=True)
+        registry.part_class("sph.parts", name) for name in registry.names("sph.parts", folders=True)
     )
     return tuple(
         kind for kind in found if not kind.formulations or formulation in kind.formulations

@@ -43,6 +43,4 @@ class Sweep:
 
     def run(self, function, models, *arguments) -> None:
         """Call function(first, last, dim, models, neighbours, *arguments) over ranges of blocks."""
-        self.team.run(
-            function, self.wanted.size, self.dim, models, self.neighbours, *arguments
-        )
+        self.team.run(function, self.wanted.size, self.dim, models, self.neighbours, *arguments)

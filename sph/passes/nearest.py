@@ -14,9 +14,7 @@ from sph.passes.gather import most_candidates, place_in, unpacked
 
 
 @njit(**COMPILED)
-def nearest(
-    first_block, last_block, dim, _, neighbours, position, support, mass, density, ratio
-):
+def nearest(first_block, last_block, dim, _, neighbours, position, support, mass, density, ratio):
     """Write ratio (N,), distance to the nearest neighbour over (m/rho)^(1/D), over blocks.
 
     Images of all particles count, also those of the particle itself; position is (D, N), the

@@ -4,7 +4,7 @@ import math
 from typing import Any, ClassVar, Literal, NamedTuple
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field
 
 Boundary = Literal["periodic", "mirror", "open"]
 
@@ -93,8 +93,9 @@ class Problem(Section):
     @property
     def boundaries(self) -> tuple[str, ...]:
         """The boundary of each axis, D names."""
-        one = isinstance(self.boundary, str)
-        return (self.boundary,) * self.dimension if one else tuple(self.boundary)
+        if isinstance(self.boundary, str):
+            return (self.boundary,) * self.dimension
+        return tuple(self.boundary)
 
     @property
     def centre(self) -> np.ndarray:
@@ -187,3 +188,29 @@ def other_physics(physics, besides: str = "") -> str | None:
         if key != besides:
             return f"the exact solution does not include physics.{key}"
     return None
+
+
+def wide(least: float) -> AfterValidator:
+    """Annotates the domain of a vortex that a narrower periodic box would cut."""
+
+    def check(domain):
+        try:
+            widths = np.diff(np.array(domain, dtype=float))
+        except ValueError:  # rows of different lengths: the configuration says so of every problem
+            return domain
+        if np.any(widths < least):
+            raise ValueError(f"{domain} is narrower than the vortex: expected at least {least:g}")
+        return domain
+
+    return AfterValidator(check)
+
+
+def only(domain: list[float]) -> AfterValidator:
+    """Annotates the domain of a problem that is set up for no other."""
+
+    def check(given):
+        if given not in (domain, [domain, domain]):
+            raise ValueError(f"this problem is set up for {domain} along both axes only")
+        return given
+
+    return AfterValidator(check)

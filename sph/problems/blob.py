@@ -10,8 +10,8 @@ from typing import Annotated, ClassVar, Literal
 import numpy as np
 from pydantic import Field, model_validator
 
-from sph import lattice as placement
 from sph.problems import base
+from sph.problems.support import lattice as placement
 
 _SHARED = base.Problem.model_fields
 
@@ -96,7 +96,7 @@ class Problem(base.Problem):
         around = around[:, self._distance(around) >= self.radius]
         cloud = self._cloud(mass)
         position = np.hstack([cloud, around])
-        state = self.exact(eos, 0.0, position)
+        state = self.exact(eos, 0.0, position) or {}
         each = np.full(position.shape[1], mass)
         return base.InitialState(position, state["velocity"], each, state["internal_energy"])
 

@@ -10,8 +10,8 @@ from typing import Annotated, ClassVar, Literal
 import numpy as np
 from pydantic import Field, model_validator
 
-from sph import lattice as placement
 from sph.problems import base
+from sph.problems.support import lattice as placement
 
 _SHARED = base.Problem.model_fields
 

@@ -9,10 +9,9 @@ from typing import Annotated, ClassVar, Literal
 import numpy as np
 from pydantic import Field, field_validator
 
-from sph import lattice as placement
 from sph.exact import expanding_ball
 from sph.problems import base
-from sph.problems.noh import CUBE_OVER_BALL
+from sph.problems.support import lattice as placement
 
 _SHARED = base.Problem.model_fields
 
@@ -75,7 +74,7 @@ class Problem(base.Problem):
         """Return particles of equal mass, from a ball of a lattice that is stretched radially."""
         dimension = self.dimension
         cube = np.array([[-1.0, 1.0]] * dimension)
-        sites = max(1, round(self.n * CUBE_OVER_BALL[dimension - 1]))
+        sites = max(1, round(self.n * placement.CUBE_OVER_BALL[dimension - 1]))
         position = placement.fill(cube, sites, self.lattice, even=True)
         distance = np.sqrt((position**2).sum(axis=0))
         within = (distance < 1.0) & (distance > 0.0)

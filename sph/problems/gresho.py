@@ -7,31 +7,18 @@ J. Sci. Comput. 25, 995; scaled to a Mach number Miczek, Roepke & Edelmann (2015
 from typing import Annotated, ClassVar, Literal
 
 import numpy as np
-from pydantic import AfterValidator, Field
+from pydantic import Field
 
-from sph import lattice as placement
 from sph.problems import base
+from sph.problems.base import wide
+from sph.problems.support import lattice as placement
+from sph.problems.support.vortex import from_centre, rotation
 
 _SHARED = base.Problem.model_fields
 
 DENSITY = 1.0
 PEAK_RADIUS, RADIUS = 0.2, 0.4  # of the maximum of the speed (1), and of the vortex
 CENTRAL_PRESSURE = 5.0
-
-
-def wide(least: float) -> AfterValidator:
-    """Return a validator of a domain: each side must be at least `least` wide."""
-
-    def check(domain):
-        try:
-            widths = np.diff(np.array(domain, dtype=float))
-        except ValueError:  # rows of different lengths are reported by the configuration
-            return domain
-        if np.any(widths < least):
-            raise ValueError(f"{domain}: expected sides of at least {least:g}, to hold the vortex")
-        return domain
-
-    return AfterValidator(check)
 
 
 class Problem(base.Problem):
@@ -129,20 +116,6 @@ class Problem(base.Problem):
         _, rise = profile(np.array([PEAK_RADIUS]))
         # P = rho c^2 / gamma where the speed is 1 and c = 1/mach
         return DENSITY / (eos.gamma * self.mach**2) - float(rise[0])
-
-
-def from_centre(box, position, velocity, time: float) -> tuple[np.ndarray, np.ndarray]:
-    """Return the offset (D, N) from the moving centre of a periodic box, and its length (N,)."""
-    length = (box[:, 1] - box[:, 0])[:, None]
-    centre = box.mean(axis=1)[:, None] + np.array(velocity)[:, None] * time
-    offset = position - centre
-    offset -= length * np.round(offset / length)
-    return offset, np.hypot(*offset)
-
-
-def rotation(offset: np.ndarray, rate) -> np.ndarray:
-    """Return the velocity (2, N) of anticlockwise rotation at `rate` (N,), at `offset` (2, N)."""
-    return rate * np.stack([-offset[1], offset[0]])
 
 
 def profile(radius: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -8,9 +8,10 @@ from typing import Annotated, ClassVar, Literal
 import numpy as np
 from pydantic import Field
 
-from sph.lattice import grid, unit_cell
 from sph.problems import base
-from sph.problems.kelvin_helmholtz_smooth import mode_amplitude, only
+from sph.problems.base import only
+from sph.problems.support.lattice import grid, unit_cell
+from sph.problems.support.shear_mode import mode_amplitude
 
 _SHARED = base.Problem.model_fields
 
@@ -74,7 +75,7 @@ class Problem(base.Problem):
         return {"mode_amplitude": mode_amplitude(particles, x, y, outward, WAVELENGTH)}
 
     def report(self, eos, time: float, particles, pressure) -> dict[str, float]:
-        return self.diagnostics(particles) | {"growth_time": TAU}
+        return self.diagnostics(particles) | {"growth_time": float(TAU)}
 
 
 def _perturbation(x: np.ndarray, y: np.ndarray) -> np.ndarray:

@@ -8,11 +8,13 @@ this amplitude. The initial velocity is not an eigenmode, so the amplitude first
 from typing import Annotated, ClassVar, Literal
 
 import numpy as np
-from pydantic import AfterValidator, Field
+from pydantic import Field
 
 from sph.exact import kelvin_helmholtz as linear
-from sph.lattice import fill
 from sph.problems import base
+from sph.problems.base import only
+from sph.problems.support.lattice import fill
+from sph.problems.support.shear_mode import mode_amplitude, surface_weight
 
 _SHARED = base.Problem.model_fields
 
@@ -26,17 +28,6 @@ PERTURBATION = 0.01  # amplitude of the velocity along y
 # still below the width of the ramp.
 GROWTH = (0.5, 1.0)
 POINTS = 128  # of linear theory along y; its growth rate is then accurate to 0.1 %
-
-
-def only(domain: list[float]) -> AfterValidator:
-    """Return a validator that accepts no other domain than `domain`."""
-
-    def check(given):
-        if given not in (domain, [domain, domain]):
-            raise ValueError(f"{given}: expected {domain}, the only domain of this problem")
-        return given
-
-    return AfterValidator(check)
 
 
 class Problem(base.Problem):
@@ -96,7 +87,7 @@ class Problem(base.Problem):
         start = np.zeros((3, POINTS), dtype=complex)
         start[1] = -1j * PERTURBATION  # sin(kx) is the real part of -i e^(ikx)
         upward = linear.evolution(layer, wavenumber, start, times)[:, 1]
-        weight = _surface_weight(y - 0.5, wavenumber)
+        weight = surface_weight(y - 0.5, wavenumber)
         return {"mode_amplitude": np.abs(upward @ weight) / weight.sum()}
 
     def over_time(self, eos, history: dict[str, np.ndarray]) -> dict[str, float]:
@@ -117,23 +108,6 @@ class Problem(base.Problem):
             "linear_growth_rate": by_theory,
             "growth_ratio": measured / by_theory,
         }
-
-
-def mode_amplitude(particles, x, height, velocity, wavelength: float) -> float:
-    """Return the amplitude in `velocity` (N,) of the mode with that wavelength along x (eqs 10-13).
-
-    `height` (N,) is y relative to the middle of the slab, whose faces are at +-1/4. Particles are
-    weighted by volume, and by exp(-k distance) from the nearer face, the shape of a surface mode.
-    """
-    wavenumber = 2.0 * np.pi / wavelength
-    weight = particles.mass / particles.density * _surface_weight(height, wavenumber)
-    sine = (weight * velocity * np.sin(wavenumber * x)).sum()
-    cosine = (weight * velocity * np.cos(wavenumber * x)).sum()
-    return float(2.0 * np.hypot(sine, cosine) / weight.sum())
-
-
-def _surface_weight(height: np.ndarray, wavenumber: float) -> np.ndarray:
-    return np.exp(-wavenumber * np.abs(np.abs(height) - 0.25))
 
 
 def _growth(t: np.ndarray, amplitude: np.ndarray) -> float:

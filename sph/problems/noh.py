@@ -9,15 +9,13 @@ from typing import Annotated, ClassVar, Literal
 import numpy as np
 from pydantic import Field, model_validator
 
-from sph import lattice as placement
 from sph.exact import noh
 from sph.problems import base
+from sph.problems.support import lattice as placement
 
 _SHARED = base.Problem.model_fields
 
 DENSITY = SPEED = 1.0
-# Volume of a cube of side 2 over that of the ball in it
-CUBE_OVER_BALL = (1.0, 4.0 / np.pi, 6.0 / np.pi)
 # The gas ends at radius R - t, where the density sum lacks neighbours. Errors are averaged up to
 # 7/8 of that radius: 0.35 at t = 0.6, as in published comparisons.
 KEPT = 0.875
@@ -103,10 +101,8 @@ class Problem(base.Problem):
 
     def initial(self, eos) -> base.InitialState:
         """Return particles of equal mass on the sites of a lattice within R of the origin."""
-        in_box = self.n * CUBE_OVER_BALL[self.dimension - 1]
-        even = (
-            self.boundary == "open"
-        )  # no particle at the origin, where the direction is undefined
+        in_box = self.n * placement.CUBE_OVER_BALL[self.dimension - 1]
+        even = self.boundary == "open"  # no particle at the origin, where no direction is defined
         position = placement.fill(self.box, max(1, round(in_box)), self.lattice, even=even)
         volume = np.prod(self.box[:, 1] - self.box[:, 0]) / position.shape[1]
         within = (position**2).sum(axis=0) < self.radius**2

@@ -6,10 +6,10 @@ from typing import Annotated, ClassVar, Literal
 import numpy as np
 from pydantic import Field, field_validator
 
-from sph import lattice as placement
 from sph.errors import ConfigError
 from sph.exact import sedov
 from sph.problems import base
+from sph.problems.support import lattice as placement
 
 _SHARED = base.Problem.model_fields
 

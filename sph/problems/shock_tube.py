@@ -5,15 +5,16 @@ The default states are those of Sod (1978), J. Comput. Phys. 27, 1. The tube lie
 """
 
 import math
-from typing import Annotated, ClassVar, Literal, NamedTuple
+from typing import Annotated, Any, ClassVar, Literal, NamedTuple
 
 import numpy as np
 from pydantic import Field, field_validator, model_validator
 
-from sph import lattice as placement
 from sph.eos import is_gamma_law
 from sph.exact import riemann
-from sph.problems import _ends, _tube_figures, base
+from sph.problems import base
+from sph.problems.support import boundary_waves, tube_figures
+from sph.problems.support import lattice as placement
 
 _SHARED = base.Problem.model_fields
 
@@ -176,7 +177,7 @@ class Problem(base.Problem):
             xi = (position[0] - self.discontinuity) / time
             density, velocity[0], pressure = riemann.solve(*self._states(), eos, xi)
         else:
-            density, velocity[0], pressure = self._undisturbed(position)
+            density, velocity[0], pressure = self._undisturbed(position)  # type: ignore[assignment]
         in_gas = np.where(density > 0.0, density, 1.0)  # vacuum has no internal energy
         return {
             "density": density,
@@ -195,7 +196,7 @@ class Problem(base.Problem):
         """Return whether no vacuum opens at the diaphragm or at an end."""
         states = self._states()
         apart = not is_gamma_law(eos) or riemann.star_state(*states, eos).vacuum
-        return not (apart or _ends.opens_vacuum(self.boundaries[0], *states, eos))
+        return not (apart or boundary_waves.opens_vacuum(self.boundaries[0], *states, eos))
 
     def undisturbed(self, eos, time: float) -> np.ndarray:
         found = super().undisturbed(eos, time)
@@ -242,8 +243,8 @@ class Problem(base.Problem):
         region, _ = self.error_region(eos, time, particles.position)
         low, high = self.undisturbed(eos, time)[0]
         region &= (low < particles.position[0]) & (particles.position[0] < high)
-        return _tube_figures.of(
-            _tube_figures.Tube(
+        return tube_figures.of(
+            tube_figures.Tube(
                 self._states(), eos, time, particles.position[0] - self.discontinuity, region,
                 particles.density, particles.velocity[0], pressure, particles.internal_energy,
                 particles.mass, exact,
@@ -251,21 +252,21 @@ class Problem(base.Problem):
         )  # fmt: skip
 
     def _states(self) -> tuple[riemann.State, riemann.State]:
-        return tuple(
+        left, right = (
             riemann.State(gas.density, gas.velocity, gas.pressure)
             for gas in (self.left, self.right)
         )
+        return left, right
 
-    def _ends(self, eos) -> _ends.Ends:
+    def _ends(self, eos) -> boundary_waves.Ends:
         """Return the waves from the ends of x."""
-        return _ends.of(self.boundaries[0], *self._states(), eos)
+        return boundary_waves.of(self.boundaries[0], *self._states(), eos)
 
     def _undisturbed(self, position: np.ndarray) -> riemann.State:
         """Return density, velocity along x and pressure (N,) at t = 0."""
         is_left = position[0] < self.discontinuity
-        return riemann.State(
-            *(np.where(is_left, *pair) for pair in zip(*self._states(), strict=True))
-        )
+        fields: Any = (np.where(is_left, *pair) for pair in zip(*self._states(), strict=True))
+        return riemann.State(*fields)
 
     def _sides(self) -> tuple[Side, Side, np.ndarray]:
         """Return both sides, and the masses (2,) of their particles.

@@ -18,8 +18,8 @@ from typing import Annotated, ClassVar, Literal
 import numpy as np
 from pydantic import Field, field_validator
 
-from sph import lattice as placement
 from sph.problems import base
+from sph.problems.support import lattice as placement
 
 _SHARED = base.Problem.model_fields
 
@@ -101,7 +101,7 @@ class Problem(base.Problem):
         low, high = self.box[0]
         share = (position[0] - low) / (high - low)  # of the mass, left of a particle
         position[0] = low + (high - low) * _inverse_mass(self._harmonics(eos), share)
-        state = self.exact(eos, 0.0, position)
+        state = self.exact(eos, 0.0, position) or {}
         n = position.shape[1]
         volume = np.prod(self.box[:, 1] - self.box[:, 0])
         mass = np.full(n, self._harmonics(eos)[0].real * volume / n)

@@ -9,9 +9,9 @@ from typing import Annotated, ClassVar, Literal
 import numpy as np
 from pydantic import Field
 
-from sph.lattice import grid
 from sph.problems import base
-from sph.problems.kelvin_helmholtz_smooth import only
+from sph.problems.base import only
+from sph.problems.support.lattice import grid
 
 _SHARED = base.Problem.model_fields
 

@@ -6,9 +6,10 @@ from typing import Annotated, ClassVar, Literal
 import numpy as np
 from pydantic import Field, field_validator
 
-from sph import lattice as placement
 from sph.exact import riemann
-from sph.problems import _ends, base
+from sph.problems import base
+from sph.problems.support import boundary_waves
+from sph.problems.support import lattice as placement
 
 _SHARED = base.Problem.model_fields
 
@@ -98,7 +99,9 @@ class Problem(base.Problem):
     def fills_box(self, eos) -> bool:
         """Return whether no vacuum opens at a wall from which the gas moves away."""
         walls = zip(self.boundaries, self._states(), strict=True)
-        return not any(_ends.opens_vacuum(kind, state, state, eos) for kind, state in walls)
+        return not any(
+            boundary_waves.opens_vacuum(kind, state, state, eos) for kind, state in walls
+        )
 
     def undisturbed(self, eos, time: float) -> np.ndarray:
         return np.array(
@@ -137,10 +140,10 @@ class Problem(base.Problem):
             velocity[0] = self.velocity
         return velocity
 
-    def _ends(self, eos) -> list[_ends.Ends]:
+    def _ends(self, eos) -> list[boundary_waves.Ends]:
         """Return the waves from the ends of each axis."""
         axes = zip(self.boundaries, self._states(), strict=True)
-        return [_ends.of(boundary, state, state, eos) for boundary, state in axes]
+        return [boundary_waves.of(boundary, state, state, eos) for boundary, state in axes]
 
     def _states(self) -> list[riemann.State]:
         """Return the state of the gas for each axis, with the velocity along that axis."""

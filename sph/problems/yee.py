@@ -9,9 +9,10 @@ from typing import Annotated, ClassVar, Literal
 import numpy as np
 from pydantic import Field
 
-from sph import lattice as placement
 from sph.problems import base
-from sph.problems.gresho import from_centre, rotation, wide
+from sph.problems.base import wide
+from sph.problems.support import lattice as placement
+from sph.problems.support.vortex import from_centre, rotation
 
 _SHARED = base.Problem.model_fields
 

@@ -65,22 +65,15 @@ class _Told:
     def __init__(self, points: int, before: int):
         self.points, self.before = points, before
         self.outcomes: list[Outcome] = []
-        self.shown = progress.suited_to_points(points, before)
-        if before:
-            self.shown.note(f"{before} of {points} points are done already")
+        self.shown = progress.suited_to_runs("points", points, before)
 
     def __call__(self, outcome: Outcome) -> None:
         self.outcomes.append(outcome)
-        ended = self.before + len(self.outcomes)
         how = ", restarted from its last checkpoint" if outcome.how == "restart" else ""
         reason = f": {outcome.reason}" if outcome.reason else ""
         status = MARKS[outcome.status]
-        width = len(str(self.points))
         warned = f", with warnings: {', '.join(outcome.warnings)}" if outcome.warnings else ""
-        self.shown.note(
-            f"[{ended:{width}d}/{self.points}] {outcome.name} {status}{how}{warned}{reason}"
-        )
-        self.shown.ended(ended)
+        self.shown.ended(f"{outcome.name} {status}{how}{warned}{reason}")
 
     def closing(self) -> str:
         """Raises NumericalError or Stopped where not all points are done."""

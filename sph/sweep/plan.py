@@ -62,7 +62,8 @@ class Plan:
 
         Raises FileError for `config`, and ConfigError with all that is wrong with any point.
         """
-        found, wrong = {}, {}
+        found: dict[str, configuration.Config] = {}
+        wrong: dict[str, list[str]] = {}
         for point in self.points:
             try:
                 overrides = (*self.overrides, *point.settings)

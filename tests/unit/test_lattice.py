@@ -6,7 +6,7 @@ import sys
 import numpy as np
 import pytest
 
-from sph import lattice
+from sph.problems.support import lattice
 
 KINDS = [
     ("cubic", 1),
@@ -158,7 +158,7 @@ def test_noise_moves_by_its_fraction_of_the_spacing_and_stays_inside():
 
 def test_scipy_spatial_is_imported_for_a_glass_only():
     code = (
-        "import sys, numpy as np; from sph import lattice; "
+        "import sys, numpy as np; from sph.problems.support import lattice; "
         "lattice.fill(np.array([[0., 1.]]), 10, 'cubic'); "
         "assert 'scipy.spatial' not in sys.modules"
     )

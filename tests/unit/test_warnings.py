@@ -294,22 +294,6 @@ def test_a_limit_beside_a_signal_that_is_not_lost_is_told(told):
     assert told(report={"wave": 0.6}, **both) == ["swamped"]
 
 
-def test_figures_are_named_as_problems_name_them():
-    fields = {"density": {"L1": 0.25, "L2": 0.5}}
-    summary = {
-        "errors": {"fields": fields}, "report": {"peak": 3.0}, "conservation": KEPT | {
-            "energy_drift": 1e-9, "energy_drift_max": 2e-9, "momentum_change": 4.0},
-    }  # fmt: skip
-    expected = {
-        "l1.density": 0.25, "l1.velocity": None, "peak": 3.0, "energy_drift": 2e-9,
-        "momentum_change": 4.0, "nothing": None,
-    }  # fmt: skip
-    assert {name: warnings.figure(summary, name) for name in expected} == expected
-    unjudged = summary | {"errors": None, "report": None}
-    assert warnings.figure(unjudged, "l1.density") is None
-    assert warnings.figure(unjudged, "peak") is None
-
-
 def test_kinds_are_told_once_each_in_order_and_not_of_old_summaries():
     told = [{"kind": kind} for kind in ("volume", "limit", "limit", "energy_drift", "volume")]
     assert warnings.kinds({"warnings": told}) == ["volume", "limit", "energy_drift"]

@@ -120,7 +120,7 @@ def _label(row: Row, keys: Sequence[str]) -> str:
 def _series(line: _Line, which, error, cost) -> Series:
     number = np.array([row.n for row in line.rows], dtype=float)
     by_number = front.slope(number, error[which])
-    dimensions = {row.summary["dimension"] for row in line.rows}
+    dimensions = {row.ended["dimension"] for row in line.rows}
     order = None
     if by_number is not None and len(dimensions) == 1:
         order = -by_number * dimensions.pop()

@@ -12,7 +12,8 @@ def on_front(cost: np.ndarray, error: np.ndarray) -> np.ndarray:
     as_cheap = cost[None, :] <= cost[:, None]
     better = error[None, :] < error[:, None]
     as_good = error[None, :] <= error[:, None]
-    return ~((cheaper & as_good) | (as_cheap & better)).any(axis=1)
+    is_beaten = (cheaper & as_good) | (as_cheap & better)
+    return ~np.any(is_beaten, axis=1)
 
 
 def cost_at(error: float, front_cost: np.ndarray, front_error: np.ndarray) -> float:

@@ -3,10 +3,12 @@
 import csv
 import io
 from collections.abc import Sequence
+from typing import Any
 
 from sph.analysis.report.compare import COSTS, RESOLUTION, Report
 from sph.analysis.report.runs import Row
 from sph.output.json_text import json_text, null
+from sph.summary import lookup
 
 NORMS = ("L1", "L2", "Linf")
 
@@ -82,10 +84,9 @@ def _cells(report: Report) -> list[list[str]]:
         line = [row.sweep] if several else []
         line += [*(row.value(key) for key in shown), str(row.n), str(row.steps)]
         line += [] if question.cost == "n" else [f"{report.cost[i]:.3g}"]
-        drift = row.summary["conservation"]["energy_drift_max"]
-        drifted = f"{drift:.1e}" if isinstance(drift, float) else str(drift)
+        drift = row.ended["conservation"]["energy_drift_max"]
         against = "front" if report.on_front[i] else f"× {report.excess[i]:.2f}"
-        line += [f"{report.error[i]:.3g}", drifted, against]
+        line += [f"{report.error[i]:.3g}", f"{drift:.1e}", against]
         lines.append([*line, ", ".join(row.warnings) or "–"] if warned else line)
     return [header, *lines]
 
@@ -103,7 +104,7 @@ def _records(report: Report) -> list[dict]:
 
 
 def _record(report: Report, row: Row) -> dict:
-    record = {"sweep": row.sweep} if row.sweep else {}
+    record: dict[str, Any] = {"sweep": row.sweep} if row.sweep else {}
     record |= {"run": row.name, "status": row.status, "reason": row.reason}
     record |= {key: row.value(key) for key in report.keys}
     if not row.summary:
@@ -121,8 +122,7 @@ def _record(report: Report, row: Row) -> dict:
     }
     for name in row.figures():
         if "." in name:
-            table, key = name.split(".")
-            record[name] = row.summary[table][key]
+            record[name] = lookup(row.summary, name)
         else:
             record |= {f"{name}_error.{norm}": row.error(name, norm) for norm in NORMS}
     return record

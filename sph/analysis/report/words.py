@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 
 from sph.analysis.report.compare import COSTS, Report, Series
-from sph.analysis.report.runs import STARTING, Row
+from sph.analysis.report.runs import Row
 
 # CPU times of equal runs differ by some per cent, more on a machine that is shared.
 LEVEL = 1.1
@@ -31,7 +31,7 @@ def _costs(report: Report) -> str:
     against = f" against the run {Path(named).name}" if named is not None else ""
     text = f"Compared: {question.error_name}{against}, weighed with {COSTS[question.cost][0]}"
     if question.cost in ("cpu", "wall"):
-        text += f" without compilation and {STARTING.replace('start', 'the start')}"
+        text += " without compilation and the start of Numba"
     return text + "."
 
 
@@ -72,13 +72,13 @@ def _warnings(report: Report) -> list[str]:
     if warned:
         said.append(f"Ended with warnings (hollow in the pictures): {'; '.join(warned)}.")
     restarted = [row.name for row in report.rows if row.is_restarted]
-    if restarted and report.question.cost in ("cpu", "wall"):
+    if restarted and report.question.cost == "wall":
         said.append(
-            f"Restarted, so their time includes what their first sessions took to start: "
-            f"{', '.join(restarted)}."
+            "Restarted, so the time contains compilation and the start of Numba in earlier "
+            f"sessions: {', '.join(restarted)}."
         )
     for row in (*report.rows, *report.without):
-        if changed := row.summary.get("settings_changed"):
+        if row.summary and (changed := row.summary["settings_changed"]):
             said.append(f"{row.name} changed its settings on the way: {'; '.join(changed)}.")
     truths = dict.fromkeys(row.truth for row in report.rows)
     if len(truths) > 1 and "." not in report.question.field:
@@ -109,7 +109,7 @@ def _is_all_front(report: Report, line: Series) -> bool:
 
 def _reason(report: Report, row: Row) -> str:
     if row.status == "done":
-        left_out = row.summary.get("errors_left_out")
+        left_out = row.summary and row.summary["errors_left_out"]
         why = f": {left_out}" if left_out and "." not in report.question.field else ""
         return f"it has no {report.question.error_name}{why}"
     return ": ".join(filter(None, [row.status, row.reason.partition("\n")[0]]))

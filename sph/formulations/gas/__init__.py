@@ -80,14 +80,18 @@ class Gas(Formulation):
         self.density = physics.density
         self.exchanges = terms.get("exchange") is not None
         self.evolves_alpha = not terms["viscosity"].finds_shocks
-        self.bounds_acceleration = physics.density == "number"  # heavy gas beside light sends no signal
+        self.bounds_acceleration = (
+            physics.density == "number"
+        )  # heavy gas beside light sends no signal
         sums = self.scheme.sums_pressure
         self.fields = (*FIELDS, Field("pressure_term", stored=False))
         if sums or self.exchanges:
             self.fields += (Field("pressure", stored=sums, remade=True),)
         if sums:
             self.fields += (Field("energy_shift", stored=False),)
-        self.fields += tuple(Field(name, stored=False) for name in ("div_v", "curl_v") if name in needs)
+        self.fields += tuple(
+            Field(name, stored=False) for name in ("div_v", "curl_v") if name in needs
+        )
         self.starting_models = self._models(scene, terms, Converged(TOLERANCE))
         self.models = self.starting_models
         if physics.density_passes != "converged":

@@ -109,9 +109,7 @@ def rates(
                 force[k], work = pair(models.scheme, term_i, term_j, slope_i, slope_j, Pi)
                 gained += work * v_dot_r
                 if exchanged is not None:
-                    speed = exchange_speed(
-                        models.exchange, pressure[i], Ps[k], rho_i, rho[k], w_ij
-                    )
+                    speed = exchange_speed(models.exchange, pressure[i], Ps[k], rho_i, rho[k], w_ij)
                     # Price (2008) eq 27: over rho_ij = (rho_i + rho_j)/2; slope r is m_j dW/dr
                     exchange = speed * (exchanged[i] - us[k]) * 2.0 * (inverse * r)
                     if shares is not None:

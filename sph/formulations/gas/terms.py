@@ -1,9 +1,9 @@
 """What the gas's pair loops and thermodynamics ask of the terms that parts bring.
 
-    viscosity   pair_alpha(alpha_i, alpha_j), and where alpha has a rate alpha_rate(…)
-    balsara     balsara_factor(divergence, curl, sound_speed, support)
-    exchange    exchange_speed(pressure_i, pressure_j, density_i, density_j, w_ij): a pair then
-                exchanges m_j speed (u_i - u_j)/rho_ij (dW/dr) of energy, or None
+viscosity   pair_alpha(alpha_i, alpha_j), and where alpha has a rate alpha_rate(…)
+balsara     balsara_factor(divergence, curl, sound_speed, support)
+exchange    exchange_speed(pressure_i, pressure_j, density_i, density_j, w_ij): a pair then
+            exchanges m_j speed (u_i - u_j)/rho_ij (dW/dr) of energy, or None
 """
 
 from sph.compiled import verb

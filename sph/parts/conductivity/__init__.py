@@ -96,7 +96,9 @@ class Conductivity(Part):
         )  # fmt: skip
 
     def largest_courant(self):
-        return LARGEST / self.exchange.strength if self.exchange.strength else float("inf"), self.name
+        return LARGEST / self.exchange.strength if self.exchange.strength else float(
+            "inf"
+        ), self.name
 
     def criterion_words(self, criterion):
         if criterion == self.name:

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from sph import kernels
-from sph.analysis.interpolate import Plane, onto_plane
+from sph.analysis.interpolate import Plane, at_points, onto_plane
 from sph.domain import Domain
 from sph.particles import Particles
 
@@ -97,6 +97,19 @@ def test_equals_the_sum_written_out(dimension, boundary, separation):
     plane = Plane.through_centre(domain.box, 6)
     (found,) = onto_plane(values[None], particles, domain, KERNEL, plane)
     expected = written_out(values, particles, separation, KERNEL, plane)
+    np.testing.assert_allclose(found, expected, rtol=0, atol=ROUND_OFF)
+
+
+@pytest.mark.parametrize("boundary", ["periodic", "mirror", "open"])
+@pytest.mark.parametrize("dimension", [2, 3])
+def test_pixels_and_points_have_the_same_fields(dimension, boundary):
+    particles, domain = random_gas(dimension, n=40), unit_domain(dimension, boundary)
+    values = np.random.default_rng(5).normal(size=(2, 40))
+    plane = Plane.through_centre(domain.box, 6)
+    x, y = (centres.ravel() for centres in pixel_centres(plane))
+    points = np.stack([x, y, np.full(x.size, plane.height)][:dimension])
+    found, _ = at_points(values, particles.velocity, particles, domain, KERNEL, points)
+    expected = onto_plane(values, particles, domain, KERNEL, plane).reshape(2, -1)
     np.testing.assert_allclose(found, expected, rtol=0, atol=ROUND_OFF)
 
 

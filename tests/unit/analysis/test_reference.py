@@ -94,7 +94,7 @@ def test_fields_are_carried_by_the_kernels(dimension, boundary, images):
 def test_in_chunks_it_is_the_same(monkeypatch):
     one, points = state(2, "periodic"), np.random.default_rng(5).random((2, 30))
     whole = at_points(one, points)
-    monkeypatch.setattr("sph.analysis.reference.CHUNK", 7)
+    monkeypatch.setattr("sph.analysis.interpolate.CHUNK", 7)
     for name, values in at_points(one, points).items():
         assert values == pytest.approx(whole[name], rel=ROUND_OFF, abs=ROUND_OFF)
 

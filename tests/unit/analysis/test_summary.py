@@ -48,7 +48,7 @@ def test_each_figure_is_told_with_its_name():
     assert "momentum to 3e-15;" in kept
     assert kept.endswith("0.9877 of the volume.")
     assert "2 s, 3 CPU s on 2 thread" in cost
-    assert "1.5 s compiling; 1,234,567 particle updates" in cost
+    assert "1.5 CPU s for compilation; 1,234,567 particle updates" in cost
 
 
 def test_what_was_not_kept_by_the_equations_alone_is_told():

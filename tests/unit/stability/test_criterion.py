@@ -1,6 +1,5 @@
 """When a run counts as stable, by summaries and states made by hand."""
 
-import json
 from types import SimpleNamespace
 
 import numpy as np
@@ -50,19 +49,20 @@ class State:
 @pytest.fixture
 def ended(tmp_path, monkeypatch):
     """ended(name, state, ...): the directory of a run that ended with these figures."""
-    states = {}
+    states, summaries = {}, {}
+    monkeypatch.setattr(
+        criterion.RunDirectory, "whole_summary", lambda run: summaries[run.path.name]
+    )
     monkeypatch.setattr(criterion, "_last", lambda directory: states[directory.name])
 
     def made(name, state=None, errors=None, report=None, drift=1e-5, **changed):
         fields = errors and {field: {"L1": error} for field, error in errors.items()}
-        summary = {
+        summaries[name] = {
             "status": "done", "reason": None, "time": 0.5, "steps": 40,
             "errors": fields and {"fields": fields}, "report": report,
             "conservation": {"energy_drift": 0.0, "energy_drift_max": drift},
             "cost": {"cpu_seconds": 9.0, "session": {"compile_cpu_seconds": 4.0}},
         } | changed  # fmt: skip
-        (tmp_path / name).mkdir()
-        (tmp_path / name / "summary.json").write_text(json.dumps(summary))
         states[name] = state or State()
         return tmp_path / name
 
@@ -95,7 +95,7 @@ def test_a_trial_tells_what_the_run_took(ended):
         0.1,
         0.5,
         40,
-        5.0,
+        9.0,
     )
     failed = ended("failed", status="failed", reason="step 3: no\nTry: more")
     trial = judge.trial(0.2, failed)

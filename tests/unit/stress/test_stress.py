@@ -85,23 +85,21 @@ def stress(tmp_path, monkeypatch):
     return run
 
 
-def test_a_suite_that_ends_as_written_passes(stress, tmp_path):
+def test_a_suite_that_ends_as_expected_passes(stress, tmp_path):
     result, case, settings = stress(STILL + CAUGHT)
     assert result.exit_code == 0, result.output
     assert case["passes"]
     assert settings["right"]["verdict"] == "pass"
     assert {settings[name]["verdict"] for name in ("caught", "refused", "overflown")} == {
-        "fails as written"
+        "expected failure"
     }
-    assert settings["caught"]["reason"].startswith("fails because the density is 1 (")
-    assert "1 of 1 cases pass; 3 settings that are to fail were caught" in result.output
+    assert settings["caught"]["reason"].startswith("the density is 1 (")
+    assert "1 of 1 cases pass; 3 expected failures;" in result.output
     # the floor of the density sum of a lattice at eta = 1.6 in one dimension, 1.002456
     assert settings["right"]["reaches"]["errors.density.L1"]["value"] == pytest.approx(
         0.002456, abs=1e-6
     )
-    assert "still reaches errors.density.L1 = 0.00246 (right), where 0 would be right" in (
-        result.output
-    )
+    assert "still reaches errors.density.L1 = 0.00246 (right); exact: 0." in (result.output)
     assert "| still | right | grad_h | pass |" in (tmp_path / "out" / "stress.md").read_text()
 
 
@@ -109,8 +107,8 @@ def test_a_suite_that_ends_as_written_passes(stress, tmp_path):
     ("more", "setting", "verdict"),
     [
         (IMPOSSIBLE, "impossible", "falls short"),
-        (UNEXPECTED, "unexpected", "passes, though written to fail"),
-        (OTHERWISE, "otherwise", "fails otherwise than written"),
+        (UNEXPECTED, "unexpected", "unexpected pass"),
+        (OTHERWISE, "otherwise", "unexpected failure"),
     ],
 )
 def test_a_case_that_ends_otherwise_than_written_exits_with_3(stress, more, setting, verdict):
@@ -119,8 +117,8 @@ def test_a_case_that_ends_otherwise_than_written_exits_with_3(stress, more, sett
     assert not case["passes"]
     assert settings["right"]["verdict"] == "pass"
     assert settings[setting]["verdict"] == verdict
-    assert "0 of 1 cases pass; 0 settings that are to fail were caught" in result.stderr
-    assert f"Short: still ({setting} {verdict})." in result.stderr
+    assert "0 of 1 cases pass; 0 expected failures;" in result.stderr
+    assert f"Not passed: still ({setting} {verdict})." in result.stderr
 
 
 def test_what_has_ended_is_not_run_again_and_is_judged_anew(stress, tmp_path):

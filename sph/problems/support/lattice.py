@@ -17,6 +17,9 @@ class Cell(NamedTuple):
     sites: tuple[tuple[float, ...], ...]  # each (D,), as fractions of the sides
 
 
+# Volume of a cube of side 2 over that of the ball in it, by dimension
+CUBE_OVER_BALL = (1.0, 4.0 / np.pi, 6.0 / np.pi)
+
 _STAGGERED = (0.25, 0.75)
 
 
