@@ -118,7 +118,7 @@ def _sample(config: Config) -> Sample:
     simulation.close()
     clock.close()
     return Sample(
-        simulation.scene.parts(),
+        simulation.scene.described(),
         simulation.particles.number,
         neighbours_per_particle(simulation),
         bytes_held(simulation),

@@ -8,7 +8,7 @@ import numpy as np
 
 from sph import config as configuration
 from sph import fingerprint
-from sph.analysis import reference
+from sph.analysis import reference, summary
 from sph.clock import Clock
 from sph.config import Config, restarts
 from sph.config.restarts import Change
@@ -19,11 +19,13 @@ from sph.output import checkpoint as checkpoints
 from sph.output.checkpoint import Checkpoint
 from sph.output.files import copy_file, is_same_path
 from sph.output.history import History
+from sph.output.history import read as read_history
 from sph.output.offenders import PART
 from sph.output.run_directory import RunDirectory, checkpoint_number, find
 from sph.runner import Runner, new_history, output_times, session, threads_of
 from sph.scene import Scene
 from sph.simulation import Simulation
+from sph.totals import Budget
 
 
 def restart(
@@ -63,7 +65,10 @@ def restart(
             restarts.lineage(checkpoint.step, checkpoint.time, changed),
         )
         next_step = _coming_step(config, checkpoint)
-        begun = dataclasses.replace(checkpoint, config=config, lineage=lineage, next_step=next_step)
+        begun = dataclasses.replace(
+            checkpoint, config=config, lineage=lineage, next_step=next_step,
+            budget=_budget(checkpoint, target),
+        )  # fmt: skip
         _begin_anew(target, number, begun, any(not one.key.startswith("run.") for one in changed))
         simulation = _resumed(begun, clock)
         if target.history.exists():
@@ -96,15 +101,27 @@ def _resumed(checkpoint: Checkpoint, clock: Clock) -> Simulation:
     origin = Origin(checkpoint.list_position, checkpoint.list_support, checkpoint.list_skin)
     return Simulation.resume(
         Scene(config), checkpoint.particles, checkpoint.time, checkpoint.step,
-        checkpoint.next_step, origin, threads_of(config), clock,
+        checkpoint.next_step, origin, threads_of(config), clock, checkpoint.budget,
     )  # fmt: skip
+
+
+def _budget(checkpoint: Checkpoint, target: RunDirectory) -> Budget | None:
+    """Return the energy budget of the checkpoint; the history has that of one of format 1."""
+    if checkpoint.budget is not None or not target.history.exists():
+        return checkpoint.budget
+    past = read_history(target.history)
+    rows = past["step"] <= checkpoint.step
+    if not rows.any():
+        return None
+    added = past["energy_added"][rows][-1] if "energy_added" in past else 0.0
+    return Budget(past["energy_injected"][rows][-1], added, summary.baseline(past))
 
 
 def _coming_step(config: Config, checkpoint: Checkpoint) -> float:
     """The checkpoint's next step, or what becomes of it under other limits (eq 32)."""
     now, before, p = config.physics, checkpoint.config.physics, checkpoint.particles
     scene = Scene(config)
-    held, held_before = (s.step_bounds.held[0] for s in (scene, Scene(checkpoint.config)))
+    held, held_before = (s.step_bounds.courant for s in (scene, Scene(checkpoint.config)))
     step = checkpoint.next_step * (held / held_before)  # unchanged where both are: bit for bit
     if step > checkpoint.next_step:
         limit = step_size.StepLimit(step, 0, "checkpoint")

@@ -95,7 +95,7 @@ def state_of(simulation: Simulation, lineage: tuple[str, ...] = ()) -> Checkpoin
         list_skin=origin.skin,
         config=simulation.scene.config,
         lineage=lineage,
-        energies=simulation.energies,
+        budget=simulation.budget,
     )
 
 
@@ -152,18 +152,9 @@ class Runner:
             if past["step"].size:
                 self.wall_before = past["wall_seconds"][-1]
                 self.cpu_before = past["cpu_seconds"][-1]
-                self._recall(past)
             else:  # a lone checkpoint: it begins the history, and has no limiter to tell
                 self._record()
             return self._to_end()
-
-    def _recall(self, past: dict[str, np.ndarray]) -> None:
-        """What the simulation counts from the start of the run on, out of the history."""
-        simulation = self.simulation
-        simulation.energy_injected = past["energy_injected"][-1]
-        if "energy_added" in past:
-            simulation.energy_added = past["energy_added"][-1]
-        simulation.go_on_from(summary.baseline(past))
 
     @contextmanager
     def _closing(self):

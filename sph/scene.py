@@ -78,6 +78,14 @@ class Scene:
         return any(part.adds_energy for part in self.all_parts)
 
     @cached_property
+    def columns(self) -> tuple[str, ...]:
+        """The columns of the history that this scene has and others do not."""
+        found = ["held_supports"] * (self.max_support < math.inf)
+        found += ["volume_ratio"] * self.is_filled
+        found += [name for part in self.all_parts for name in part.columns]
+        return (*found, *["energy_added"] * self.adds_energy)
+
+    @cached_property
     def is_filled(self) -> bool:
         """Whether gas fills a box without open sides, so that sum m/rho is to be its volume."""
         return self.config.problem.fills_box(self.eos) and "open" not in self.domain.boundaries

@@ -93,9 +93,12 @@ class Simulation:
     @classmethod
     def resume(
         cls, scene: Scene, particles: State, time: float, step: int, next_step: float,
-        origin: Origin, threads: int, clock: Clock,
+        origin: Origin, threads: int, clock: Clock, budget: totals.Budget | None = None,
     ) -> "Simulation":  # fmt: skip
-        """From a checkpoint, to go on bit for bit as if there had been no stop."""
+        """From a checkpoint, to go on bit for bit as if there had been no stop.
+
+        budget: None begins the energy budget anew.
+        """
         self = cls(scene, particles, threads, clock)
         self.time, self.step = time, step
         self.limit = step_size.StepLimit(next_step, 0, "checkpoint")
@@ -103,13 +106,20 @@ class Simulation:
             self.search.build(origin, particles.id)
         self._sweep.models = scene.formulation.models
         self.totals = totals.of(particles, scene.all_parts, scene.keeps_momentum)
-        self.go_on_from(totals.Baseline.at(self.totals, 0.0))
+        anew = totals.Budget(0.0, 0.0, totals.Baseline.at(self.totals, 0.0))
+        self.go_on_from(anew if budget is None else budget)
         return self
 
-    def go_on_from(self, baseline: totals.Baseline) -> None:
-        """Measure the energy drift from `baseline`."""
-        self.baseline = baseline
-        self.energy_drift = baseline.drift(self.totals, self.energy_added)
+    @property
+    def budget(self) -> totals.Budget:
+        """What a restart needs to go on with the energy budget."""
+        baseline = self.baseline or totals.Baseline(0.0, 0.0)  # of a run that failed at its start
+        return totals.Budget(self.energy_injected, self.energy_added, baseline)
+
+    def go_on_from(self, budget: totals.Budget) -> None:
+        """Count energies on from `budget`, and measure the drift from its baseline."""
+        self.energy_injected, self.energy_added, self.baseline = budget
+        self.energy_drift = self.baseline.drift(self.totals, self.energy_added)
 
     def advance(self, until: float) -> None:
         """One step (the nine of docs/equations.md), cut where it would pass `until`.
@@ -156,6 +166,19 @@ class Simulation:
         self._sweep.neighbours = self._neighbours()
         self._sweep.run(nearest.nearest, None, p.position, p.support, p.mass, p.density, found)
         return found
+
+    def columns(self) -> dict[str, float]:
+        """The columns of the history that only some scenes have (`Scene.columns`)."""
+        scene, found = self.scene, dict(self.totals.energies)
+        if scene.max_support < np.inf:
+            found["held_supports"] = self.held_supports
+        if scene.is_filled:
+            found["volume_ratio"] = self.volume_ratio
+        if scene.adds_energy:
+            found["energy_added"] = self.energy_added
+        for part in scene.all_parts:
+            found |= part.sums(self.particles)
+        return {name: found[name] for name in scene.columns}
 
     def close(self) -> None:
         self.team.close()

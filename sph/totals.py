@@ -69,6 +69,14 @@ class Baseline(NamedTuple):
         return math.copysign(math.inf, change) if change else 0.0
 
 
+class Budget(NamedTuple):
+    """The energy that a run has counted since it began, and the baseline of its drift."""
+
+    injected: float  # to keep internal energies positive
+    added: float  # by sources
+    baseline: Baseline
+
+
 def of(state, parts, keeps_momentum) -> Totals:
     """The totals of a state; parts: those whose energies belong to the total.
 

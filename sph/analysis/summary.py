@@ -23,7 +23,7 @@ def of_run(
     exact solution; where the configuration names a reference, `reference.errors_against` has them.
     """
     scene, particles = simulation.scene, simulation.particles
-    inside, outside = scene.parts()
+    inside, outside = scene.described()
     result: Summary = {
         "status": status,
         "reason": reason,
@@ -39,7 +39,7 @@ def of_run(
         "errors": None,
         "errors_left_out": None,
         "report": None,
-        "conservation": conservation(history, particles, scene),
+        "conservation": conservation(history, particles, scene, simulation.baseline),
         "nearest": None,
         "cost": cost(simulation, history),
         "compiled_in": inside,
@@ -60,7 +60,7 @@ def of_run(
 def _judge(result: Summary, simulation, history) -> None:
     """Set the errors and the problem's own figures of a run that has not failed."""
     config, now, particles = simulation.scene.config, simulation.time, simulation.particles
-    pressure = particles.pressure_by(simulation.scene.eos)
+    pressure = simulation.scene.formulation.pressure(particles)
     if not config.report.reference:
         result["errors"] = errors.against_exact(config, now, particles, pressure)
         result["errors_left_out"] = truth.left_out(config, now, particles.position)
@@ -75,14 +75,14 @@ def warn(summary: Summary, simulation) -> None:
     summary["warnings"] = [{"kind": one.kind, "text": one.text} for one in found]
 
 
-def conservation(history, particles, scene) -> Conservation:
-    """What the run conserved, from its history, its last state and its scene."""
+def conservation(history, particles, scene, start: Baseline) -> Conservation:
+    """What the run conserved, from its history, its last state, its scene and its baseline."""
     drift = history["energy_drift"]
     ratio = history.get("volume_ratio")
     return {
         "energy_drift": float(drift[-1]),
         "energy_drift_max": float(np.abs(drift).max()),
-        "energy_injected": float(history["energy_injected"][-1] / baseline(history).scale),
+        "energy_injected": float(history["energy_injected"][-1] / start.scale),
         "momentum_change": _momentum_change(history, particles, scene),
         "volume_ratio": None if ratio is None else float(ratio[-1]),
         "volume_ratio_worst": None if ratio is None else float(_farthest_from_one(ratio)),
@@ -105,7 +105,7 @@ def _momentum_change(history, particles, scene) -> float | None:
     p = particles
     with np.errstate(invalid="ignore"):  # the last state of a run that failed
         bulk = scene.keeps_momentum * (p.velocity @ p.mass) / p.mass.sum()
-        sound_speed = scene.eos.sound_speed(p.density, p.pressure_by(scene.eos))
+        sound_speed = scene.eos.sound_speed(p.density, scene.formulation.pressure(p))
         speed = np.linalg.norm(p.velocity - bulk[:, None], axis=0)
         scale = float(np.sum(p.mass * (speed + sound_speed)))
     return float(np.abs(momentum - momentum[:, :1]).max() / scale)

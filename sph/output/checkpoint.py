@@ -16,7 +16,6 @@ import sys
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
-from typing import NamedTuple
 
 import h5py
 import numpy as np
@@ -29,7 +28,7 @@ from sph.output.files import Damaged, PatientFile, is_sealed, opened, replacing,
 from sph.output.stored import GROUP, Refused
 from sph.scene import Scene
 from sph.state import State
-from sph.totals import Baseline
+from sph.totals import Baseline, Budget
 from sph.version import __version__
 
 # To be raised with every change of what the datasets of /Checkpoint mean.
@@ -41,14 +40,6 @@ NOT_PARTICLES = ("time", "step", "next_step", "list_position", "list_support", "
 PART = "a particle that failed and its neighbours, alone"
 
 START_ELSEWHERE = "Try: an earlier checkpoint of the run, or start the run anew."
-
-
-class Energies(NamedTuple):
-    """What a run counts since it began, and what its energy drift is measured from."""
-
-    injected: float  # to keep internal energies positive
-    added: float  # by sources
-    baseline: Baseline
 
 
 @dataclass
@@ -64,7 +55,7 @@ class Checkpoint:
     list_skin: float  # their skin, as a fraction of H
     config: configuration.Config
     lineage: tuple[str, ...]  # the runs it came from, oldest first
-    energies: Energies | None = None  # None: of format 1, which leaves them to the history
+    budget: Budget | None = None  # None: of format 1, which leaves them to the history
     computed_by: str | None = None  # of one that was read: `fingerprint.as_json` of its writer
 
     @functools.cached_property
@@ -142,8 +133,8 @@ def state_hash(state: dict[str, np.ndarray]) -> str:
 
 def _state(checkpoint: Checkpoint) -> dict[str, np.ndarray]:
     state = {name: np.asarray(getattr(checkpoint, name)) for name in NOT_PARTICLES}
-    if checkpoint.energies is not None:
-        injected, added, baseline = checkpoint.energies
+    if checkpoint.budget is not None:
+        injected, added, baseline = checkpoint.budget
         values = np.array([injected, added, *baseline])
         state |= {name: values[k] for k, name in enumerate(stored.ENERGIES)}
     return state | checkpoint.particles.arrays()
@@ -162,7 +153,7 @@ def _write_private(group: h5py.Group, checkpoint: Checkpoint, state, digest) -> 
     hdf5.write_attributes(
         group,
         {
-            "format_version": FORMAT_VERSION if checkpoint.energies is not None else 1,
+            "format_version": FORMAT_VERSION if checkpoint.budget is not None else 1,
             "fields": _fields(checkpoint.particles),
             "configuration": text,
             "lineage": json.dumps(checkpoint.lineage),
@@ -267,10 +258,10 @@ def _config(path: Path, text: str) -> configuration.Config:
 
 
 def _checkpoint(path: Path, state: dict, config, texts: dict[str, str]) -> Checkpoint:
-    energies = None
+    budget = None
     if stored.ENERGIES[0] in state:
         injected, added, *baseline = (float(state.pop(name)) for name in stored.ENERGIES)
-        energies = Energies(injected, added, Baseline(*baseline))
+        budget = Budget(injected, added, Baseline(*baseline))
     others = {name: state.pop(name) for name in NOT_PARTICLES}
     scene = Scene(config)
     _check_fields(path, state, scene, texts.get("fields"))
@@ -284,7 +275,7 @@ def _checkpoint(path: Path, state: dict, config, texts: dict[str, str]) -> Check
         list_skin=float(others["list_skin"]),
         config=config,
         lineage=_lineage(path, texts["lineage"]),
-        energies=energies,
+        budget=budget,
         computed_by=texts.get("computed_by"),
     )
     found.scene = scene

@@ -14,7 +14,6 @@ from sph.errors import FileError
 from sph.output.files import check_in_place, explained, open_to_append, read_text, write_text
 
 TEXT_COLUMNS = {"limiter"}
-OF_SOME_SCENES = ("held_supports", "volume_ratio", "potential_energy", "energy_added")
 
 # Columns whose last values a restart continues.
 COUNTED = (
@@ -130,18 +129,18 @@ def read(path: Path) -> dict[str, np.ndarray]:
 
 
 def check(
-    path: Path, dimension: int, diagnostics: Sequence[str], step: int, sums: Mapping[str, float]
+    path: Path, dimension: int, others: Sequence[str], step: int, sums: Mapping[str, float]
 ) -> None:
     """Raise FileError if a restart cannot continue this history after `step`.
 
     Steps must be consecutive from the first row to `step`, values finite, and the row of `step`
-    must agree with `sums`. diagnostics: columns of the problem.
+    must agree with `sums`. others: columns of the scene and of the problem.
     """
     path = Path(path)
     names, rows = _names_and_rows(path)
     ours = columns(dimension)
-    _check_columns(path, names, [*ours, *diagnostics])
-    foreign = [one for one in names if one not in (*ours, *diagnostics, *OF_SOME_SCENES)]
+    _check_columns(path, names, [*ours, *others])
+    foreign = [one for one in names if one not in (*ours, *others)]
     if foreign:
         raise _of_another_run(path, f"it has columns {', '.join(foreign)}")
     kept = [row for row in rows if int(row[0]) <= step]

@@ -63,7 +63,7 @@ def _part(state: Checkpoint, indices: np.ndarray) -> Checkpoint:
         list_skin=state.list_skin,
         config=state.config,
         lineage=(*state.lineage, PART),
-        energies=state.energies,
+        budget=state.budget,
     )
 
 
