@@ -3,9 +3,6 @@
 import csv
 import json
 import re
-import subprocess
-import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -578,11 +575,3 @@ def test_labels_of_pictures():
     )
     assert labels.value_alone("scheme = grad_h") == "grad_h"
     assert labels.value_alone("eta = 1.6") == "eta = 1.6"
-
-
-def test_the_commands_cost_nothing_until_called():
-    heavy = {"matplotlib", "h5py", "pydantic", "distributed", "submitit"}
-    code = f"import sys, sph.cli_studies; print(*({heavy!r} & set(sys.modules)))"
-    found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True,
-                           cwd=Path(reports.__file__).parents[3])  # fmt: skip
-    assert found.stdout.strip() == ""
