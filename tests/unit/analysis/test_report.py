@@ -464,6 +464,7 @@ def test_a_report_is_not_written_through_a_link(study, tmp_path):
 # --- what is written --------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_the_command_writes_table_words_and_pictures(study):
     result = CliRunner().invoke(main, ["report", str(study)])
     assert result.exit_code == 0, result.output
@@ -529,6 +530,7 @@ def sweep_of(path, alphas, factor):
     return path
 
 
+@pytest.mark.slow
 def test_several_sweeps_have_a_panel_each(tmp_path):
     from sph.analysis.figures import report as pictures
 

@@ -85,6 +85,7 @@ def stress(tmp_path, monkeypatch):
     return run
 
 
+@pytest.mark.slow
 def test_a_suite_that_ends_as_written_passes(stress, tmp_path):
     result, case, settings = stress(STILL + CAUGHT)
     assert result.exit_code == 0, result.output
@@ -105,6 +106,7 @@ def test_a_suite_that_ends_as_written_passes(stress, tmp_path):
     assert "| still | right | grad_h | pass |" in (tmp_path / "out" / "stress.md").read_text()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("more", "setting", "verdict"),
     [
@@ -123,6 +125,7 @@ def test_a_case_that_ends_otherwise_than_written_exits_with_3(stress, more, sett
     assert f"Short: still ({setting} {verdict})." in result.stderr
 
 
+@pytest.mark.slow
 def test_what_has_ended_is_not_run_again_and_is_judged_anew(stress, tmp_path):
     stress(STILL)
     summary = tmp_path / "out" / "still" / "still.right" / "summary.json"
@@ -136,6 +139,7 @@ def test_what_has_ended_is_not_run_again_and_is_judged_anew(stress, tmp_path):
     assert summary.stat().st_mtime_ns == before
 
 
+@pytest.mark.slow
 def test_only_named_cases_run(stress):
     result, _, _ = stress(STILL, "--only", "st*")
     assert result.exit_code == 0
