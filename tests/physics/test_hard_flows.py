@@ -10,6 +10,7 @@ from sph.problems import base
 SHIPPED = ["expanding_ball"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("stem", SHIPPED)
 def test_shipped_configuration_keeps_the_limits_of_its_problem(run, stem):
     outcome = run(stem)
@@ -22,6 +23,7 @@ def test_shipped_configuration_keeps_the_limits_of_its_problem(run, stem):
 # --- nothing may happen -----------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("mach", [1e3, 1e5])
 @pytest.mark.parametrize(
     ("dimension", "n", "keys"),
@@ -98,6 +100,7 @@ def test_ball_becomes_motion_in_any_dimension(run, dimension, n):
 # --- cloud and ring ---------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_wind_wears_a_cloud_down(run):
     outcome = run("blob", "problem.n=3000", "time.end=4.0")
     fractions = [one["cloud_mass_fraction"] for one in outcome.diagnostics]
@@ -110,6 +113,7 @@ def test_wind_wears_a_cloud_down(run):
     assert 0.1 < report["cloud_velocity"] < 1.0
 
 
+@pytest.mark.slow
 def test_ring_stays_whole_without_viscosity_and_breaks_with_much(run):
     period = 2.0 * np.pi
     keys = ("problem.n=1000", f"time.end={2.0 * period}")

@@ -13,6 +13,7 @@ def order(numbers, errors) -> float:
     return -np.polyfit(np.log(numbers), np.log(errors), 1)[0]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("stem", SHIPPED)
 def test_shipped_configuration_keeps_the_limits_of_its_problem(run, stem):
     outcome = run(stem)
@@ -46,6 +47,7 @@ def test_viscosity_makes_it_first_order(run):
     assert -0.05 < damping < -0.01
 
 
+@pytest.mark.slow
 def test_waves_in_two_dimensions_meet_a_floor_that_only_eta_lowers(run):
     def across(n_x, *overrides):
         keys = ("problem.dimension=2", f"problem.n={n_x * n_x // 8}", *overrides)
@@ -71,6 +73,7 @@ def test_steepened_wave_is_the_exact_one(run):
 SEED = ("physics.kernel=wendland_c2", "physics.eta=1.6", "physics.alpha=1.0")
 
 
+@pytest.mark.slow
 def test_settings_for_vortices_beat_the_seeds(run):
     good, seed = run("gresho").report(), run("gresho", *SEED).report()
     # 0.0263 and 0.0733 were measured
@@ -78,6 +81,7 @@ def test_settings_for_vortices_beat_the_seeds(run):
     assert good["peak_v_phi"] > 0.85 > 0.75 > seed["peak_v_phi"]
 
 
+@pytest.mark.slow
 def test_bulk_motion_adds_no_error(run):
     at_rest = run("gresho", "problem.n=1024").report()
     moving = run("gresho", "problem.n=1024", "problem.velocity=[1.0, 0.5]").report()
@@ -85,6 +89,7 @@ def test_bulk_motion_adds_no_error(run):
     assert moving["error_v_phi"] == pytest.approx(at_rest["error_v_phi"], rel=1e-3)
 
 
+@pytest.mark.slow
 def test_smooth_vortex_converges(run):
     errors = [run("yee", f"problem.n={n}").l1("velocity") for n in (1024, 4096)]
     # in the number along an axis. First order is what viscosity and the noise of particles that
@@ -141,6 +146,7 @@ def test_surface_tension_of_the_seeds_scheme_rounds_a_square(run):
     assert 0.08 < report["dense_outside"] < 0.16
 
 
+@pytest.mark.slow
 def test_waves_of_density_behind_a_shock(run):
     report = run("shu_osher", "problem.n=800").report()
     # Mach 3 into a mean density of 1: -4 + 1.8 x 3 x 1.18322 = 2.389, bent by the waves to 2.396

@@ -66,6 +66,7 @@ def test_courant_number_near_the_limit_of_stability_shows_in_the_energy(run, mon
     assert drift("0.30") == pytest.approx(6.6e-3, rel=0.02)  # another run: `run` keeps them by key
 
 
+@pytest.mark.slow
 def test_three_dimensional_tube_is_the_one_dimensional_one(run):
     """A coarse 3-D Sod tube, for its shape; the full one is in scripts/."""
     outcome = run("sod_3d", "problem.n=12348")  # half the cells along each axis

@@ -272,7 +272,7 @@ def test_alpha_decays_over_its_own_length():
     np.testing.assert_allclose(found.alpha_rate, -0.25 * sound / h, rtol=1e-12)
 
 
-@pytest.mark.parametrize("dimension", [2, 3])
+@pytest.mark.parametrize("dimension", [2, pytest.param(3, marks=pytest.mark.slow)])
 def test_rotation_has_curl_two_and_no_divergence(dimension):
     """Exact about the centre of a cubic lattice, for the reason of the expansion."""
     axis = np.linspace(-1, 1, {2: 21, 3: 11}[dimension])

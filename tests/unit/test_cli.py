@@ -416,6 +416,7 @@ def test_an_interrupt_while_loading_is_no_traceback(config, monkeypatch):
     assert_told(result, 130, "sph: ended by Ctrl-C")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM], ids=lambda one: one.name)
 def test_a_signal_in_a_run_leaves_a_checkpoint(number, config, tmp_path):
     process = started(tmp_path, "run", config, "-o", "run", "--set", "time.end=1e6",
@@ -451,6 +452,7 @@ def test_a_second_interrupt_ends_at_once(config, tmp_path, monkeypatch):
     assert_told(result, 130, "wrote checkpoint_000000.h5", "sph: ended by Ctrl-C")
 
 
+@pytest.mark.slow
 def test_a_stop_while_compiling_and_a_restart_equal_a_run_without(config, tmp_path):
     """Also compiled code is the same whether it was just compiled or comes from the cache."""
     cache = {"NUMBA_CACHE_DIR": str(tmp_path / "cache")}
@@ -471,6 +473,7 @@ def test_a_stop_while_compiling_and_a_restart_equal_a_run_without(config, tmp_pa
     assert found == hashes(tmp_path / "other")
 
 
+@pytest.mark.slow
 def test_a_killed_run_goes_on_from_its_last_good_checkpoint(config, tmp_path):
     process = started(tmp_path, "run", config, "-o", "run", "--set", "time.end=1e3")
     read_until(process.stderr, "wrote checkpoint_000002.h5")

@@ -194,6 +194,7 @@ def test_an_entry_that_others_can_write_to(cache):
     assert called() == (6.0, True)  # written anew
 
 
+@pytest.mark.slow
 def test_a_home_that_cannot_be_written(tmp_path):
     """Commands that compile nothing say nothing of it."""
     nowhere = {"HOME": "/dev/null", "XDG_CACHE_HOME": "/dev/null/cache"}
@@ -256,6 +257,7 @@ def test_every_fact_is_in_the_name_of_the_directory(monkeypatch):
     assert len(keys) == 1 + len(facts)
 
 
+@pytest.mark.slow
 def test_code_compiled_under_other_settings_is_not_taken(tmp_path):
     place = {"NUMBA_CACHE_DIR": str(tmp_path / "cache")}
     assert in_new_process(tmp_path, **place, NUMBA_OPT="0")[0] == [7.0, 0, 1]

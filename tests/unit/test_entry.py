@@ -41,6 +41,7 @@ def python(*arguments, directory=ROOT, **environment):
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM], ids=lambda one: one.name)
 @pytest.mark.parametrize(
     ("program", "command", "module"),
@@ -72,13 +73,7 @@ def test_a_signal_that_is_ignored_stays_so():
     assert (done.returncode, done.stdout) == (0, f"sph, version {sph.__version__}\n")
 
 
-def test_the_version_needs_no_numba():
-    done = python("-X", "importtime", "-m", "sph", "--version")
-    assert done.returncode == 0
-    assert "click" in done.stderr
-    assert "numba" not in done.stderr
-
-
+@pytest.mark.slow
 @pytest.mark.parametrize("command", [["list"], ["--help"], ["sweep", "--help"], ["new", "gresho"]])
 def test_python_without_docstrings_says_the_same(command):
     plain, without = (python("-m", "sph", *command, PYTHONOPTIMIZE=level) for level in ("", "2"))

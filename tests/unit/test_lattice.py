@@ -1,8 +1,5 @@
 """Every lattice fills its box with whole cells of one volume, across periodic faces too."""
 
-import subprocess
-import sys
-
 import numpy as np
 import pytest
 
@@ -154,12 +151,3 @@ def test_noise_moves_by_its_fraction_of_the_spacing_and_stays_inside():
     assert -0.5 <= moved.min() < -0.49
     assert 0.49 < moved.max() <= 0.5
     assert abs(moved.mean()) < 0.015
-
-
-def test_scipy_spatial_is_imported_for_a_glass_only():
-    code = (
-        "import sys, numpy as np; from sph.problems.support import lattice; "
-        "lattice.fill(np.array([[0., 1.]]), 10, 'cubic'); "
-        "assert 'scipy.spatial' not in sys.modules"
-    )
-    subprocess.run([sys.executable, "-c", code], check=True)

@@ -124,6 +124,7 @@ avx2_only = pytest.mark.skipif(not has_avx2(), reason="looks for AVX2 instructio
 # --- the cache on disk ---
 
 
+@pytest.mark.slow
 def test_passes_are_cached_across_processes(first_steps):
     first, second = first_steps
     assert first["hits"] == [0, 0]
@@ -134,6 +135,7 @@ def test_passes_are_cached_across_processes(first_steps):
     assert second["compiling"] < 0.05 * first["compiling"]
 
 
+@pytest.mark.slow
 def test_code_just_compiled_and_code_from_the_cache_give_the_same_bits(first_steps):
     """A callee that is not inlined is compiled twice: on its own, and within its caller.
 
@@ -155,6 +157,7 @@ def test_cache_directory_is_the_one_asked_for(tmp_path):
     assert not list(tmp_path.rglob("*.nb[ci]"))
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(os.name != "posix", reason="the user's cache directory is moved by HOME")
 def test_an_edit_to_a_function_that_is_called_is_seen(tmp_path):
     copy = tmp_path / "sph"
@@ -321,6 +324,7 @@ def test_running_extremes_and_divisions_are_vectorised():
     assert packed_instructions(_quotients, "vdivpd") > 0
 
 
+@pytest.mark.slow
 @avx2_only
 @pytest.mark.skipif(
     bool(os.environ.get("NUMBA_BOUNDSCHECK")), reason="checks of bounds keep loops from it"

@@ -131,6 +131,7 @@ def test_a_hundred_million_particles_are_previewed_at_once(few):
     assert figure(text, "Memory: # MB") > 1e4
 
 
+@pytest.mark.slow
 def test_a_problem_that_needs_more_particles_gets_them(few):
     contrast = BOX.replace("gresho", "contrast")
     keys = ["problem.masses=equal", "problem.profile=graded", "problem.ratio=1e5"]

@@ -1,7 +1,5 @@
 """Initial states, exact solutions and figures of the problems, without running any."""
 
-import subprocess
-import sys
 from types import SimpleNamespace
 
 import numpy as np
@@ -115,17 +113,6 @@ def test_a_problem_that_takes_any_gas_asks_nothing_but_its_formulas(name):
         np.testing.assert_array_equal(
             exact["internal_energy"], problem.exact(AIR, 0.0, state.position)["internal_energy"]
         )
-
-
-@pytest.mark.parametrize("name", registry.names("sph.problems"))
-def test_module_imports_no_heavy_package(name):
-    # Numba, which models are compiled by, itself looks for SciPy
-    code = (
-        f"import sys, numba, sph, pydantic; before = set(sys.modules); import sph.problems.{name}; "
-        "new = {one.partition('.')[0] for one in set(sys.modules) - before}; "
-        "assert not new & {'scipy', 'h5py', 'matplotlib', 'click'}, new"
-    )
-    subprocess.run([sys.executable, "-c", code], check=True)
 
 
 # --- shock tube -------------------------------------------------------------------------------

@@ -166,6 +166,7 @@ def test_a_sweep_on_a_terminal_shows_a_bar(monkeypatch):
     assert " of 2 points" in stream.getvalue()
 
 
+@pytest.mark.slow
 def test_a_run_on_a_terminal_shows_a_bar_and_keeps_stdout_for_the_summary(tmp_path):
     (tmp_path / "tube.toml").write_text(TUBE)
     terminal, its_end = pty.openpty()

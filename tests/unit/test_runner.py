@@ -775,6 +775,7 @@ def test_a_failure_before_anything_is_computed_leaves_the_particle(tmp_path):
     assert checkpoints.read(run.offenders).particles.id.tolist() == [caught.value.particle]
 
 
+@pytest.mark.slow
 def test_a_directory_in_which_a_run_is_under_way_is_left_alone(tmp_path, tube):
     run, said = RunDirectory(tmp_path / "run"), []
 

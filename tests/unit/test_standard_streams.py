@@ -50,6 +50,7 @@ def shell(tmp_path):
     return called
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("arguments", "code"),
     [
@@ -77,6 +78,7 @@ def test_what_cannot_be_written_changes_no_exit_code(arguments, code, shell, tmp
         assert (tmp_path / "run" / "summary.json").exists()
 
 
+@pytest.mark.slow
 def test_a_signal_at_a_run_without_stderr_stops_it_and_spoils_no_file(tmp_path):
     (tmp_path / "tube.toml").write_text(TUBE)
     # a file of the run must not be descriptor 2, to which the signal handler writes
@@ -103,6 +105,7 @@ def test_a_signal_at_a_run_without_stderr_stops_it_and_spoils_no_file(tmp_path):
     assert len(history.read(tmp_path / "run" / "history.csv")["step"]) == 2
 
 
+@pytest.mark.slow
 def test_a_terminal_that_hangs_up_ends_no_run(tmp_path):
     (tmp_path / "tube.toml").write_text(TUBE)
     terminal, its_end = pty.openpty()

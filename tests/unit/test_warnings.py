@@ -146,6 +146,7 @@ def test_a_sound_run_has_no_warnings_strict_or_not(tmp_path):
     assert "warning" not in (result.stdout + result.stderr).lower()
 
 
+@pytest.mark.slow
 def test_reports_and_sweeps_mark_runs_with_warnings(ended, tmp_path):
     scene = tmp_path / "scene.toml"
     scene.write_text(SCENES["limit"])

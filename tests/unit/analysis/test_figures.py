@@ -100,6 +100,7 @@ def lines(panel) -> list[np.ndarray]:
 # --- sets of pictures -------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("problem", registry.names("sph.problems"))
 def test_the_run_of_every_problem_draws(tmp_path, problem):
     states = [state_of(problem, time=0.0), state_of(problem)]
@@ -117,6 +118,7 @@ def test_the_run_of_every_problem_draws(tmp_path, problem):
         assert 0.01 < (picture.min(axis=2) < 0.7).mean() < 0.99
 
 
+@pytest.mark.slow
 def test_each_of_several_runs_gets_its_own_set(tube, shear):
     drawn = figures.draw([tube.path, shear.path])
     assert {path.parent for path in drawn} == {tube.figures, shear.figures}

@@ -3,9 +3,6 @@
 import csv
 import json
 import re
-import subprocess
-import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -476,6 +473,7 @@ def test_a_report_is_not_written_through_a_link(study, tmp_path):
 # --- what is written --------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_the_command_writes_table_words_and_pictures(study):
     result = CliRunner().invoke(main, ["report", str(study)])
     assert result.exit_code == 0, result.output
@@ -541,6 +539,7 @@ def sweep_of(path, alphas, factor):
     return path
 
 
+@pytest.mark.slow
 def test_several_sweeps_have_a_panel_each(tmp_path):
     from sph.analysis.figures import report as pictures
 
@@ -587,11 +586,3 @@ def test_labels_of_pictures():
     )
     assert labels.value_alone("scheme = grad_h") == "grad_h"
     assert labels.value_alone("eta = 1.6") == "eta = 1.6"
-
-
-def test_the_commands_cost_nothing_until_called():
-    heavy = {"matplotlib", "h5py", "pydantic", "distributed", "submitit"}
-    code = f"import sys, sph.cli_studies; print(*({heavy!r} & set(sys.modules)))"
-    found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True,
-                           cwd=Path(reports.__file__).parents[3])  # fmt: skip
-    assert found.stdout.strip() == ""

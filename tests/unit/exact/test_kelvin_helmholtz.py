@@ -25,6 +25,7 @@ def published(n):
     return kh.ShearLayer(1.0, velocity, density, np.full(n, 5.0 / 3.0 * smooth.PRESSURE))
 
 
+@pytest.mark.slow
 def test_tanh_layer():
     # Michalke (1964), J. Fluid Mech. 19, 543: the fastest growth of tanh(y), incompressible, is
     # 0.1897 at k = 0.4446. Here the Mach number is 0.01, which enters squared, and the two layers
@@ -40,6 +41,7 @@ def test_compression_slows_growth():
     assert kh.growth_rate(two_layers(96, 40.0, 1.0, mach=0.5), 0.4446) < 0.15
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("densities", [(1.0, 2.0), (1.0, 10.0)])
 def test_thin_layers_are_vortex_sheets(densities):
     # the width enters at first order in k width, which two widths extrapolate away; what is left is
@@ -58,6 +60,7 @@ def test_a_sheet_by_hand():
     assert kh.vortex_sheet(3.0, (0.5, -0.5), (1.0, 2.0)) == pytest.approx(2.0**0.5, rel=1e-15)
 
 
+@pytest.mark.slow
 def test_growth_of_the_published_layers_converges():
     # their slope has kinks, so the order is near 2: each doubling leaves a quarter of the change
     coarse, middle, fine = (kh.growth_rate(published(n), WAVENUMBER) for n in (32, 64, 128))
@@ -65,6 +68,7 @@ def test_growth_of_the_published_layers_converges():
     assert fine == pytest.approx(2.832, rel=0.002)  # the limit, from 192, 256 and 384 points
 
 
+@pytest.mark.slow
 def test_evolution_ends_in_the_fastest_mode():
     layer = published(64)
     start = np.zeros((3, 64), dtype=complex)
@@ -96,6 +100,7 @@ def test_at_the_start_it_is_the_start():
 # --- the problem that is held against it ------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_the_published_problem_measures_theory_as_theory():
     from sph.config import from_text
 

@@ -438,6 +438,7 @@ def test_killed_while_writing_leaves_the_old_checkpoint(written, make_state, mom
     assert os.listdir(written.parent) == [written.name]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("megabytes", [0, 1, 8, 21])
 def test_full_disk_leaves_the_old_checkpoint_and_says_so(written, megabytes):
     """A limit to the size of a file stands in for the disk: the state is of 21.6 MB."""

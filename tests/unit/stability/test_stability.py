@@ -54,6 +54,7 @@ def searched(tube):
     return called(tube, target, "--jobs", "2"), target
 
 
+@pytest.mark.slow
 def test_a_search_finds_the_largest_stable_courant_number(searched):
     result, target = searched
     assert result.exit_code == 0, result.output
@@ -79,6 +80,7 @@ def test_a_search_finds_the_largest_stable_courant_number(searched):
     assert [float(line["value"]) for line in lines] == sorted(verdicts)
 
 
+@pytest.mark.slow
 def test_a_run_that_stops_itself_is_a_verdict_with_its_reason(searched):
     _, target = searched
     trials = json.loads((target / "physics.C.json").read_text())["trials"]
@@ -90,6 +92,7 @@ def test_a_run_that_stops_itself_is_a_verdict_with_its_reason(searched):
         assert (target / trial["name"] / "offenders.h5").is_file()
 
 
+@pytest.mark.slow
 def test_runs_that_are_there_are_not_repeated_and_judged_anew(searched, tube):
     _, target = searched
     before = {path: path.stat().st_mtime_ns for path in target.glob("*/summary.json")}
@@ -104,6 +107,7 @@ def test_runs_that_are_there_are_not_repeated_and_judged_anew(searched, tube):
     assert judge.trial(0.0375, target / "physics.C=0.0375").verdict == "stable"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("word", ["nan", "inf"])
 def test_an_error_that_is_no_number_is_beyond_the_limit(searched, tmp_path, word):
     _, target = searched
@@ -116,6 +120,7 @@ def test_an_error_that_is_no_number_is_beyond_the_limit(searched, tmp_path, word
     assert f"pressure is {word} of its limit" in trial.reason
 
 
+@pytest.mark.slow
 def test_a_killed_run_goes_on(searched, tube):
     _, target = searched
     run = target / "default"
@@ -128,6 +133,7 @@ def test_a_killed_run_goes_on(searched, tube):
     assert json.loads(summary.read_text())["errors"] == before["errors"]
 
 
+@pytest.mark.slow
 def test_another_configuration_in_the_directory_is_refused(searched, tube):
     _, target = searched
     result = called(tube, target, "--set", "problem.n=50")
@@ -157,12 +163,14 @@ def test_a_missing_configuration_exits_with_4(tmp_path):
     assert called(tmp_path / "none.toml", tmp_path / "out").exit_code == 4
 
 
+@pytest.mark.slow
 def test_a_reference_that_fails_exits_with_3(tube, tmp_path):
     result = called(tube, tmp_path / "out", "--set", "physics.max_energy_drift=1e-15")
     assert result.exit_code == 3, result.output
     assert "the reference run physics.C=0.0375 fails: step" in result.stderr
 
 
+@pytest.mark.slow
 def test_a_run_that_is_refused_is_a_verdict_with_its_reason(searched, tube):
     """At eta = 5e4 a support takes more than a thousand images of the box."""
     _, target = searched
@@ -172,6 +180,7 @@ def test_a_run_that_is_refused_is_a_verdict_with_its_reason(searched, tube):
     assert "times the shortest side of the box" in trials.done[5e4].reason
 
 
+@pytest.mark.slow
 def test_without_an_exact_solution_runs_are_held_to_the_reference(tmp_path):
     path = tmp_path / "four.toml"
     path.write_text(
@@ -193,6 +202,7 @@ def test_without_an_exact_solution_runs_are_held_to_the_reference(tmp_path):
     )
 
 
+@pytest.mark.slow
 def test_islands_of_stability_are_told(searched, tube):
     _, target = searched
     found = command.run(tube, "physics.C", (), target, ("resolution=1.5",), 2)
@@ -215,6 +225,7 @@ def changed(run, target, change):
     return target
 
 
+@pytest.mark.slow
 def test_energy_drift_is_held_to_the_problem_or_to_the_reference(searched, tmp_path):
     _, target = searched
     reference, default = target / "physics.C=0.0375", target / "default"
@@ -235,6 +246,7 @@ def test_energy_drift_is_held_to_the_problem_or_to_the_reference(searched, tmp_p
     assert Judge(drifts, Criterion()).drift == pytest.approx(3.0 * allowed)
 
 
+@pytest.mark.slow
 def test_the_limits_of_the_problem_are_kept_too(searched, tmp_path, monkeypatch):
     _, target = searched
     reference, default = target / "physics.C=0.0375", target / "default"
@@ -261,6 +273,7 @@ def test_the_limits_of_the_problem_are_kept_too(searched, tmp_path, monkeypatch)
     assert breaks.figures["momentum_change"].bound == pytest.approx(0.9)
 
 
+@pytest.mark.slow
 def test_without_an_exact_solution_figures_are_those_of_the_reference(tmp_path):
     """A mode may be a hundredth of the flow: in the fields its loss would not be seen."""
     path = tmp_path / "four.toml"
@@ -283,6 +296,7 @@ def test_without_an_exact_solution_figures_are_those_of_the_reference(tmp_path):
     assert Trials(path, "physics.eta", (), tmp_path / "out", Criterion(), 1).judge.report == {}
 
 
+@pytest.mark.slow
 def test_a_shortened_search_says_what_it_did_not_run(tmp_path):
     path = tmp_path / "four.toml"
     path.write_text(
@@ -296,6 +310,7 @@ def test_a_shortened_search_says_what_it_did_not_run(tmp_path):
     )
 
 
+@pytest.mark.slow
 def test_errors_below_a_part_of_the_field_do_not_count(searched, tmp_path):
     """Against a reference without errors: of velocity, a part of the mean |v| + c_s."""
     _, target = searched
@@ -317,6 +332,7 @@ def test_errors_below_a_part_of_the_field_do_not_count(searched, tmp_path):
         assert judge.errors[name] == pytest.approx(1e-9 * np.average(size, weights=volume)), name
 
 
+@pytest.mark.slow
 def test_particles_are_compared_by_their_ids(tmp_path):
     """Runs that order them otherwise, as their lists ask, have no error by that."""
     path = tmp_path / "four.toml"

@@ -85,6 +85,7 @@ def stress(tmp_path, monkeypatch):
     return run
 
 
+@pytest.mark.slow
 def test_a_suite_that_ends_as_expected_passes(stress, tmp_path):
     result, case, settings = stress(STILL + CAUGHT)
     assert result.exit_code == 0, result.output
@@ -103,6 +104,7 @@ def test_a_suite_that_ends_as_expected_passes(stress, tmp_path):
     assert "| still | right | grad_h | pass |" in (tmp_path / "out" / "stress.md").read_text()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("more", "setting", "verdict"),
     [
@@ -121,6 +123,7 @@ def test_a_case_that_ends_otherwise_than_written_exits_with_3(stress, more, sett
     assert f"Not passed: still ({setting} {verdict})." in result.stderr
 
 
+@pytest.mark.slow
 def test_what_has_ended_is_not_run_again_and_is_judged_anew(stress, tmp_path):
     stress(STILL)
     summary = tmp_path / "out" / "still" / "still.right" / "summary.json"
@@ -134,6 +137,7 @@ def test_what_has_ended_is_not_run_again_and_is_judged_anew(stress, tmp_path):
     assert summary.stat().st_mtime_ns == before
 
 
+@pytest.mark.slow
 def test_only_named_cases_run(stress):
     result, _, _ = stress(STILL, "--only", "st*")
     assert result.exit_code == 0

@@ -5,7 +5,7 @@ import subprocess
 import sys
 
 import pytest
-from conftest import TWELVE, attempts, hashes, runs, until
+from sweeps import TWELVE, attempts, hashes, runs, until
 
 distributed = pytest.importorskip("distributed")
 
@@ -42,7 +42,7 @@ def address(tmp_path):
                     stderr=subprocess.DEVNULL,
                 )
             )
-            until(file.exists)
+            until(lambda: file.exists() and file.read_text())  # the file is empty at first
         yield json.loads(file.read_text())["address"]
     finally:
         for process in reversed(started):
@@ -50,6 +50,7 @@ def address(tmp_path):
             process.wait(30)
 
 
+@pytest.mark.slow
 def test_the_same_sweep_by_dask_gives_the_same_numbers(killed, cluster, program, tmp_path):
     """Bit for bit those of a sweep that was killed and went on from checkpoints."""
     result = program.run(*TWELVE, "--scheduler", cluster.scheduler_address, "-o", tmp_path / "dask")
@@ -58,6 +59,7 @@ def test_the_same_sweep_by_dask_gives_the_same_numbers(killed, cluster, program,
     assert hashes(tmp_path / "dask") == hashes(killed.path)
 
 
+@pytest.mark.slow
 def test_a_scheduler_of_its_own(address, program, tmp_path):
     path = tmp_path / "sweep"
     arguments = ("--vary", "physics.max_energy_drift=0.02,1e-15", "--set", "time.end=0.002",
@@ -71,6 +73,7 @@ def test_a_scheduler_of_its_own(address, program, tmp_path):
     assert attempts(path, "physics.max_energy_drift=1e-15") == ["run", "run"]
 
 
+@pytest.mark.slow
 def test_a_stop_reaches_the_workers(cluster, program, tmp_path):
     path = tmp_path / "sweep"
     process = program.started("--vary", "problem.n=40,50,60", "--set", "time.end=4.0",

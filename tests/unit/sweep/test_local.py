@@ -10,7 +10,7 @@ from pathlib import Path
 
 import h5py
 import pytest
-from conftest import attempts, runs, until
+from sweeps import attempts, runs, until
 
 from sph.output.history import read as read_history
 from sph.sweep import command
@@ -32,6 +32,7 @@ def prepared(program, *varies):
     return tasks(sweep, plan)
 
 
+@pytest.mark.slow
 def test_a_killed_sweep_run_again_ends_with_all_points(killed):
     assert killed.second.exit_code == 0, killed.second.output
     assert "12 of 12 points are done." in killed.second.stdout
@@ -41,6 +42,7 @@ def test_a_killed_sweep_run_again_ends_with_all_points(killed):
     assert {summary["time"] for summary in found.values()} == {0.4}
 
 
+@pytest.mark.slow
 def test_a_killed_sweep_repeats_no_work(killed):
     assert "stopped: ended by signal 9" in killed.told
     assert 4 <= len(killed.before) < 12  # else nothing was killed
@@ -57,6 +59,7 @@ def test_a_killed_sweep_repeats_no_work(killed):
     assert "step 0," not in lineage
 
 
+@pytest.mark.slow
 def test_a_sweep_that_is_done_does_nothing(killed):
     before = killed.done()
     again = killed.program.run("--vary", "problem.n=40", "--vary", "physics.alpha=0.5,1.0",
@@ -67,6 +70,7 @@ def test_a_sweep_that_is_done_does_nothing(killed):
     assert len(SweepDirectory(killed.path).plan().points) == 12
 
 
+@pytest.mark.slow
 def test_a_failed_point_is_told_and_the_rest_go_on(program, tmp_path):
     arguments = ("--vary", "physics.eta=1.6,5e4", "--vary", "physics.max_energy_drift=0.02,1e-15",
                  "--set", "time.end=0.002", "-o", tmp_path / "sweep")  # fmt: skip
@@ -93,6 +97,7 @@ def test_a_failed_point_is_told_and_the_rest_go_on(program, tmp_path):
     assert attempts(tmp_path / "sweep", failed.path.name) == ["run", "run"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM], ids=lambda one: one.name)
 def test_a_signal_stops_the_runs_with_a_checkpoint(number, program, tmp_path):
     path = tmp_path / "sweep"
@@ -118,6 +123,7 @@ def test_a_signal_stops_the_runs_with_a_checkpoint(number, program, tmp_path):
     process.communicate(timeout=60)
 
 
+@pytest.mark.slow
 def test_a_second_interrupt_ends_the_runs_at_once(program, tmp_path):
     path = tmp_path / "sweep"
     # enough particles for the initial state to take longer than two signals
@@ -152,6 +158,7 @@ def test_nobody_runs_a_point_that_another_process_is_at(program):
     assert found == [("problem.n=40", "done", "", "", 0, ())]
 
 
+@pytest.mark.slow
 def test_an_orphan_keeps_its_lock(program, tmp_path):
     path = tmp_path / "sweep"
     process = program.started("--vary", "problem.n=40", "--set", "time.end=2.0", "-o", path)
@@ -182,6 +189,7 @@ def test_threads_are_shared_out(program, monkeypatch):
     assert told == [None] * 5
 
 
+@pytest.mark.slow
 def test_the_last_lines_of_a_run_without_a_message_are_the_reason(program, monkeypatch):
     (task,) = prepared(program, "problem.n=40")
     # a file where the run directory should be
@@ -215,6 +223,7 @@ def test_a_sweep_says_how_many_points_it_has_and_above_a_bound_asks(program, tmp
     assert ran == [3]
 
 
+@pytest.mark.slow
 def test_what_the_file_system_refuses_for_a_point_is_its_reason(program, tmp_path):
     path = tmp_path / "a path/sweep"
     (path.parent).mkdir()

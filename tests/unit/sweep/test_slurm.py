@@ -4,7 +4,7 @@ import os
 import signal
 
 import pytest
-from conftest import attempts, hashes, until
+from sweeps import attempts, hashes, until
 
 from sph.sweep import slurm
 
@@ -21,6 +21,7 @@ def job_of(run):
     return None
 
 
+@pytest.mark.slow
 def test_a_job_that_comes_to_its_limit_goes_on_by_restart(program, tmp_path):
     arguments = ("--vary", "problem.n=40", "--set", "time.end=1.0")
     path = tmp_path / "sweep"
@@ -37,6 +38,7 @@ def test_a_job_that_comes_to_its_limit_goes_on_by_restart(program, tmp_path):
     assert hashes(path) == hashes(tmp_path / "here")
 
 
+@pytest.mark.slow
 def test_a_job_that_fails_is_told(program, tmp_path):
     result = program.run("--vary", "physics.eta=5e4", "--slurm", "cluster=local", "-o",
                          tmp_path / "sweep")  # fmt: skip
