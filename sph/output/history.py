@@ -129,18 +129,20 @@ def read(path: Path) -> dict[str, np.ndarray]:
 
 
 def check(
-    path: Path, dimension: int, others: Sequence[str], step: int, sums: Mapping[str, float]
-) -> None:
+    path: Path, dimension: int, diagnostics: Sequence[str], optional: Sequence[str], step: int,
+    sums: Mapping[str, float],
+) -> None:  # fmt: skip
     """Raise FileError if a restart cannot continue this history after `step`.
 
     Steps must be consecutive from the first row to `step`, values finite, and the row of `step`
-    must agree with `sums`. others: columns of the scene and of the problem.
+    must agree with `sums`. diagnostics: columns of the
+    problem, which must be there; optional: columns of the scene, which older files may lack.
     """
     path = Path(path)
     names, rows = _names_and_rows(path)
     ours = columns(dimension)
-    _check_columns(path, names, [*ours, *others])
-    foreign = [one for one in names if one not in (*ours, *others)]
+    _check_columns(path, names, [*ours, *diagnostics])
+    foreign = [one for one in names if one not in (*ours, *diagnostics, *optional)]
     if foreign:
         raise _of_another_run(path, f"it has columns {', '.join(foreign)}")
     kept = [row for row in rows if int(row[0]) <= step]

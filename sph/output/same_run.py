@@ -42,8 +42,9 @@ def check_history(path: Path, checkpoint: Checkpoint) -> None:
             "kinetic_energy": float(0.5 * np.sum(p.mass * p.velocity**2)),
             "internal_energy": float(p.mass @ p.internal_energy),
         }
-        others = [*checkpoint.scene.columns, *config.problem.diagnostics(p)]
-    history.check(path, p.dimension, others, checkpoint.step, sums)
+        diagnostics = list(config.problem.diagnostics(p))
+    optional = checkpoint.scene.columns
+    history.check(path, p.dimension, diagnostics, optional, checkpoint.step, sums)
 
 
 def check_order(earlier: Path, later: Path, before: Checkpoint, after: Checkpoint) -> None:

@@ -147,7 +147,7 @@ def test_what_to_try_can_help(begin, settings, words, not_words):
     remedy = faults.drift_remedy(simulation)
     assert words in remedy
     assert not_words not in remedy
-    held, words_of_it = simulation.scene.step_bounds.held[0], faults.held_courant(simulation.scene)
+    held, words_of_it = simulation.scene.step_bounds.courant, faults.held_courant(simulation.scene)
     assert (words_of_it is None) == (held == simulation.scene.config.physics.C)
 
 

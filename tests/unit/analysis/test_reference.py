@@ -5,6 +5,7 @@ import json
 import numpy as np
 import pytest
 from click.testing import CliRunner
+from states import gas_state
 
 from sph import config as configuration
 from sph import runner
@@ -13,7 +14,6 @@ from sph.cli import main
 from sph.errors import ConfigError, FileError
 from sph.output.checkpoint import Checkpoint
 from sph.output.run_directory import RunDirectory
-from sph.particles import Particles
 from sph.progress import Lines
 
 # Sums of some hundred terms, in any order.
@@ -23,7 +23,7 @@ ROUND_OFF = 1e-12
 def state(dimension, boundary, n=120, seed=0) -> Checkpoint:
     """A checkpoint of random particles in the unit box, as `at_points` asks for it."""
     random = np.random.default_rng(seed)
-    particles = Particles.at_start(
+    particles = gas_state(
         random.random((dimension, n)),
         random.normal(size=(dimension, n)),
         1.0 + random.random(n),

@@ -1,6 +1,5 @@
 import concurrent.futures
 import contextlib
-import dataclasses
 import errno
 import fcntl
 import io
@@ -17,7 +16,6 @@ import pytest
 
 from sph.errors import FileError
 from sph.output import checkpoint, files, stored
-from sph.particles import Particles
 
 
 @pytest.fixture
@@ -83,6 +81,7 @@ def test_round_trip_is_bit_for_bit(tmp_path, make_state, dimension, alpha):
         state.config.physics,
     )
     assert back.lineage == state.lineage
+    assert back.budget == state.budget
 
 
 def test_pressure_is_that_of_the_state(make_state):
@@ -105,9 +104,12 @@ def test_private_datasets_are_the_numerical_state(written, make_state):
     state = make_state()
     with h5py.File(written) as file:
         group = file["Checkpoint"]
-        assert set(group) == {*state.particles.arrays(), *checkpoint.NOT_PARTICLES}
-        for name, dataset in group.items():
-            assert dataset.ndim == stored.AXES[name], name
+        arrays = state.particles.arrays()
+        scalars = {*stored.SCALARS, *stored.ENERGIES}
+        assert set(group) == {*arrays, *stored.LISTS, *scalars}
+        for name, array in arrays.items():
+            assert group[name].shape == array.shape, name
+        assert all(group[name].shape == () for name in scalars)
         assert "[run]" not in group.attrs["configuration"]
         assert "[physics]" in group.attrs["configuration"]
 
@@ -361,7 +363,7 @@ def test_a_group_that_is_a_link_is_refused(written, link, monkeypatch):
 def test_no_particles(tmp_path, make_state):
     path = tmp_path / "a.h5"
     state = make_state()
-    state.particles = Particles(**{n: a[..., :0] for n, a in state.particles.arrays().items()})
+    state.particles = state.particles.subset(np.zeros(0, np.int64))
     state.list_position, state.list_support = np.zeros((2, 0)), np.zeros(0)
     digest = concurrent.futures.Future()
     digest.set_result(checkpoint.state_hash(checkpoint._state(state)))
@@ -371,12 +373,14 @@ def test_no_particles(tmp_path, make_state):
     refused(path, "0 particles")
 
 
-def test_fields_are_those_of_the_particles():
-    names = {one.name for one in dataclasses.fields(Particles)}
-    assert stored.AXES.keys() == names | set(checkpoint.NOT_PARTICLES)
-    assert set(stored.OF_SOME_SCENES) == {
-        one.name for one in dataclasses.fields(Particles) if one.default is None
-    }
+def test_fields_written_are_those_of_the_scene(tmp_path, make_state):
+    path = tmp_path / "a.h5"
+    state = make_state()
+    checkpoint.write(path, state)
+    with h5py.File(path) as file:
+        named = stored.fields_of(file["Checkpoint"].attrs["fields"])
+    fields = {one.name: one for one in state.scene.fields if one.stored}
+    assert named == {name: (one.rank, one.remade) for name, one in fields.items()}
 
 
 @pytest.mark.parametrize(("version", "word"), [(0, "an older"), (1000, "a newer")])

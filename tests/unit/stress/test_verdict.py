@@ -4,11 +4,11 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from states import gas_state
 
 from sph.analysis.report.runs import Row
 from sph.output.checkpoint import Checkpoint
 from sph.output.history import History
-from sph.particles import Particles
 from sph.stress import verdict as verdicts
 from sph.stress.case import ALWAYS, Bound, Case, Failing
 from sph.stress.figures import Figures
@@ -77,7 +77,7 @@ def test_a_setting_goes_before_its_case_and_both_before_what_holds_for_all():
 
 def state(velocity, energy, order):
     x = np.zeros((2, 3))
-    particles = Particles.at_start(x, np.array(velocity, float), np.ones(3), np.array(energy))
+    particles = gas_state(x, np.array(velocity, float), np.ones(3), np.array(energy))
     particles.id[:] = [1, 2, 3]
     for array in particles.arrays().values():
         array[...] = array[..., order].copy()
