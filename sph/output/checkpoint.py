@@ -95,7 +95,7 @@ def write(path: Path, checkpoint: Checkpoint) -> None:
         digest = beside.submit(state_hash, state)  # while HDF5 waits for the disk
         with h5py.File(disk, "w") as file:
             layout.write_public(file, checkpoint)
-            _write_private(hdf5.create_group(file, GROUP), checkpoint, state, digest)
+            _write_private(hdf5.create_group(file.id, GROUP), checkpoint, state, digest)
         seal(disk)
         disk.raise_failure()
 
@@ -145,7 +145,7 @@ def _fields(particles: State) -> str:
     return json.dumps({f.name: [f.rank, f.remade] for f in particles.fields if f.stored})
 
 
-def _write_private(group: h5py.Group, checkpoint: Checkpoint, state, digest) -> None:
+def _write_private(group: h5py.h5g.GroupID, checkpoint: Checkpoint, state, digest) -> None:
     """Write the state; digest: the future of its SHA-256."""
     for name, array in state.items():
         hdf5.write_dataset(group, name, array)  # no checksum of HDF5's: two digests are enough
