@@ -1,16 +1,17 @@
-"""Equations of state: one file each, a NamedTuple with these methods.
+"""Equations of state, one file each: a NamedTuple with these methods, in code units.
 
     pressure(density, internal_energy)       P
     sound_speed(density, pressure)           c_s
-    internal_energy(density, pressure)       u, the inverse of the first (initial states)
+    internal_energy(density, pressure)       u, the inverse of `pressure`
 
-and, where they end elsewhere than at u = 0,
+and, if u of cold gas is not 0,
 
-    lowest_energy(density)                   u of cold gas, at and below which there is no sound
+    lowest_energy(density)                   u of cold gas, where the sound speed is 0
 
-All take numbers in compiled code and NumPy arrays of any one shape elsewhere; code units.
+Arguments are numbers in compiled code, and elsewhere NumPy arrays of equal shape.
 
-One that is an ideal gas in P + p_inf has the attributes `gamma` and `p_inf`, for exact solutions.
+An equation of state that is an ideal gas in P + p_inf has the attributes `gamma` and `p_inf`, which
+exact solutions use.
 """
 
 from sph import registry
@@ -28,15 +29,15 @@ def sound_speed(self, density, pressure):
 
 
 def is_gamma_law(eos) -> bool:
-    """Whether P + p_inf = (gamma - 1)(rho u - p_inf), which has an exact Riemann solution."""
+    """Return whether P + p_inf = (gamma - 1)(rho u - p_inf), as `sph.exact.riemann` requires."""
     return hasattr(eos, "gamma") and hasattr(eos, "p_inf")
 
 
 def is_ideal(eos) -> bool:
-    """Whether P = (gamma - 1) rho u."""
+    """Return whether P = (gamma - 1) rho u."""
     return is_gamma_law(eos) and eos.p_inf == 0.0
 
 
 def make(name: str, **parameters):
-    """The equation of state of that name, e.g. make("ideal_gas", gamma=1.4)."""
+    """Return the equation of state of that name, e.g. make("ideal_gas", gamma=1.4)."""
     return registry.model_class("sph.eos", name)(**parameters)

@@ -1,4 +1,4 @@
-"""Ideal gas of constant adiabatic index (seed eqs 19-20)."""
+"""Ideal gas of constant adiabatic index (eqs 19-20)."""
 
 from typing import NamedTuple
 
@@ -10,7 +10,7 @@ class IdealGas(NamedTuple):
 
     gamma: float
 
-    p_inf = 0.0  # no parameter: what a stiffened gas has
+    p_inf = 0.0  # not a parameter: the value of a stiffened gas that is ideal
 
     def pressure(self, density, internal_energy):
         return (self.gamma - 1.0) * density * internal_energy  # eq 19

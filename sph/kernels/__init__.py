@@ -1,16 +1,16 @@
-"""Smoothing kernels: W(r, H) = H^-D w(r/H) with compact support r < H (seed eq 9).
+"""Smoothing kernels: W(r, H) = H^-D w(r/H), zero for r >= H, the support radius (eq 9).
 
-A kernel is a file that holds a NamedTuple with these methods, all free of branches so that
-the pair loop vectorises. `dim` is any tuple of length D, `q` = r/H >= 0; w and its derivative come
-without the normalisation C, which a loop applies once a particle.
+A kernel is a file with a NamedTuple that has these methods, all without branches so that the pair
+loop vectorises. `dim` is any tuple of length D, `q` = r/H >= 0. The methods w and dw_over_q omit
+the normalisation C, which a loop applies once per particle.
 
     normalisation(dim)      C, such that the integral of C w over space is 1
     w(dim, q)               w(q) / C, zero for q >= 1
-    dw_over_q(dim, q)       (dw/dq) / (q C): finite at q = 0 where the kernel is smooth
-    force_over_q(dim, q)    the same, as it enters the pair force (eqs 22-23)
+    dw_over_q(dim, q)       (dw/dq) / (q C): finite at q = 0 for smooth kernels
+    force_over_q(dim, q)    like dw_over_q, for the pair force (eqs 22-23)
 
-and, where its particles pair at large eta, the attribute `pairs_above`: by dimension, the largest
-eta at which the particles of uniform gas stay apart (docs/measurements.md, section "Pairing").
+A kernel with the pairing instability also has the attribute `pairs_above`: for each dimension, the
+largest eta without pairing in uniform gas (docs/measurements.md, section "Pairing").
 """
 
 import numpy as np
@@ -40,9 +40,9 @@ def force_over_q(self, dim, q):
 
 
 def support_ratio(kernel, dimension: int) -> float:
-    """H/h = 1/(2 sigma), sigma the kernel's standard deviation per axis (Dehnen & Aly 2012)."""
+    """Return H/h = 1/(2 sigma), with sigma the kernel's standard deviation (Dehnen & Aly 2012)."""
     dim = (0,) * dimension
-    # Gauss's rule is exact for the polynomials that a kernel is made of, joined at sixths.
+    # Gauss-Legendre quadrature is exact, since kernels are polynomials between multiples of 1/6.
     node, weight = np.polynomial.legendre.leggauss(20)
     q = ((node + 1) / 2 + np.arange(6)[:, None]).ravel() / 6
     shell = np.tile(weight, 6) * q ** (dimension - 1) * kernel.w(dim, q)
@@ -51,5 +51,5 @@ def support_ratio(kernel, dimension: int) -> float:
 
 
 def make(name: str, **parameters):
-    """The kernel of that name, e.g. make("cubic_spline", flattened=True)."""
+    """Return the kernel of that name, e.g. make("cubic_spline", flattened=True)."""
     return registry.model_class("sph.kernels", name)(**parameters)

@@ -67,7 +67,7 @@ def test_open_axis_lets_go():
 def test_supports_may_take_a_thousand_images_of_the_box():
     domain = Domain(BOX, ("periodic", "mirror", "open"))  # 2, 0.5 and 3 wide
     domain.check_reach(14.0, 10, 7)  # 15 x 57 images
-    words = r"particle 7 needs a kernel support of 16, 32 times the shortest side"
+    words = r"particle 7 needs a support radius of 16, 32 times the shortest side"
     with pytest.raises(NumericalError, match=words):
         domain.check_reach(16.0, 10, 7)  # 17 x 65
     Domain(BOX, ("open",) * 3).check_reach(1e9, 10, 7)
