@@ -88,7 +88,7 @@ def longer_steps(simulation) -> str:
     """What to try where steps have become too short to go on, by what sets the coming one."""
     scene, criterion = simulation.scene, simulation.limit.criterion
     if criterion == "energy":
-        return "physics.energy_limit = false, which leaves fast heating and cooling to eq 32"
+        return "physics.energy_limit = false, which leaves fast changes of internal energy to eq 32"
     by_part = _remedies(scene, "short steps", criterion)
     if criterion == "acceleration" and by_part:
         return by_part[0]

@@ -1,4 +1,4 @@
-"""Models: named tuples of parameters whose methods are formulas (kernels, equations of state, …)."""
+"""Models: named tuples of parameters whose methods are formulas, such as kernels."""
 
 from typing import Annotated, Any, NamedTuple, get_args, get_origin, get_type_hints
 

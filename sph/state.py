@@ -43,21 +43,45 @@ class Field(NamedTuple):
 
 # What every formulation has.
 COMMON = (
-    Field("id", integer=True, public=Public("ParticleIDs", 0, 0, 0, 0, "What stays with a particle, from 1")),
+    Field(
+        "id",
+        integer=True,
+        public=Public("ParticleIDs", 0, 0, 0, 0, "What stays with a particle, from 1"),
+    ),
     Field("mass", above=0.0, public=Public("Masses", 0, 1, 0, 0, "Mass")),
-    Field("position", 1, public=Public("Coordinates", 1, 0, 0, 1, "Position from the corner of the box; add Header/Origin")),
-    Field("velocity", 1, public=Public("Velocities", 1, 0, -1, 0, "Velocity")),
-    Field("internal_energy", at_least=0.0, public=Public("InternalEnergies", 2, 0, -2, -2, "Internal energy per unit mass")),
-    Field("support", above=0.0, public=Public("SmoothingLengths", 1, 0, 0, 1, "Smoothing length h; the kernel ends at H = (H/h) h")),
-    Field("density", above=0.0, public=Public("Densities", -3, 1, 0, -3, "Density, per D-dimensional volume")),
-    Field("acceleration", 1),
+    Field(
+        "position",
+        rank=1,
+        public=Public(
+            "Coordinates", 1, 0, 0, 1, "Position from the corner of the box; add Header/Origin"
+        ),
+    ),
+    Field("velocity", rank=1, public=Public("Velocities", 1, 0, -1, 0, "Velocity")),
+    Field(
+        "internal_energy",
+        at_least=0.0,
+        public=Public("InternalEnergies", 2, 0, -2, -2, "Internal energy per unit mass"),
+    ),
+    Field(
+        "support",
+        above=0.0,
+        public=Public(
+            "SmoothingLengths", 1, 0, 0, 1, "Smoothing length h; the kernel ends at H = (H/h) h"
+        ),
+    ),
+    Field(
+        "density",
+        above=0.0,
+        public=Public("Densities", -3, 1, 0, -3, "Density, per D-dimensional volume"),
+    ),
+    Field("acceleration", rank=1),
     Field("energy_rate"),
-    Field("predicted_velocity", 1, stored=False),  # at the full step (eqs 4 and 5)
+    Field("predicted_velocity", rank=1, stored=False),  # at the full step (eqs 4 and 5)
     Field("predicted_energy", stored=False),
     Field("support_before", stored=False),  # H of the step before
     Field("sound_speed", stored=False),
     Field("signal_speed", stored=False),  # the largest of the particle's pairs (eq 32)
-)  # fmt: skip
+)
 
 
 class State:
@@ -106,7 +130,7 @@ class State:
         return self.__dict__.get(name)
 
     def declare(self, fields: Iterable[Field]) -> list[str]:
-        """Have exactly these fields: others go, new ones are zeros. Returns the names of the new."""
+        """Have exactly these fields: others go, new ones are zeros. Returns new names."""
         fields, known = tuple(fields), {field.name for field in self.fields}
         for name in known - {field.name for field in fields}:
             delattr(self, name)
@@ -133,4 +157,4 @@ class State:
     def reorder(self, order: np.ndarray, names: Iterable[str]) -> None:
         """Put the arrays of those names into another memory order, (N,) indices."""
         for name in names:
-            setattr(self, name, np.ascontiguousarray(getattr(self, name)[..., order]))
+            setattr(self, name, getattr(self, name).take(order, axis=-1))

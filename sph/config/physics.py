@@ -1,4 +1,4 @@
-"""The table [physics]: keys of every formulation here, those of the parts from their declarations."""
+"""The table [physics]: the keys of every formulation, and those that parts declare."""
 
 import functools
 from typing import Annotated, Any, ClassVar

@@ -58,8 +58,8 @@ class Refused(Exception):
 def load(file: io.FileIO, version: int) -> tuple[dict[str, np.ndarray], dict[str, str]]:
     """Return the datasets and the text attributes of /Checkpoint. Raises Refused.
 
-    version: the newest format number that this version of sph reads. HDF5 reads through `file`, so it
-    takes no lock and opens no other file.
+    version: the newest format number that this version of sph reads. HDF5 reads through `file`, so
+    it takes no lock and opens no other file.
     """
     try:
         with h5py.File(file, "r") as opened:

@@ -1,4 +1,4 @@
-"""Grad-h SPH of a gas: density from neighbours, pair forces, artificial viscosity (docs/equations.md)."""
+"""Grad-h SPH of a gas: density from neighbours, pair forces, artificial viscosity."""
 
 from typing import Literal, NamedTuple
 
@@ -53,8 +53,8 @@ class Gas(Formulation):
         Key(
             "density",
             'density estimate of a particle: "mass" sums m_j W over its neighbours; "number" sums '
-            "W and multiplies by its own mass, which is better for unequal masses and identical for "
-            "equal ones",
+            "W and multiplies by its own mass, which is better for unequal masses and identical "
+            "for equal ones",
             kind=Literal["mass", "number"],
             default="mass",
         ),

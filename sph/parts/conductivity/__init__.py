@@ -10,6 +10,8 @@ tells whether that is times the mean of the two particles' shares, found by the 
 The class attribute `suits_gravity` tells whether it rests in equilibrium with an external field.
 """
 
+import math
+
 from sph import registry
 from sph.model import Model
 from sph.part import Key, Part, Pass

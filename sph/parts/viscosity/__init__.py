@@ -24,8 +24,8 @@ import math
 
 from sph import registry
 from sph.integrators.leapfrog import STRAIGHT
-from sph.model import Model
-from sph.part import Evolved, Key, Part, Pass
+from sph.model import Model, Parameter
+from sph.part import Evolved, Key, Part
 from sph.state import Field, Public
 
 SWITCHES = "sph.parts.viscosity.switches"
@@ -49,6 +49,10 @@ class Coefficient(Model):
 
     evolves = True
     finds_shocks = False
+
+
+LOWEST = Parameter("smallest alpha: each alpha decays to this value", at_least=0.0)
+HIGHEST = Parameter("largest alpha, approached in strong compression", at_least=0.0)
 
 
 class Switch(Coefficient):
@@ -88,8 +92,8 @@ class Viscosity(Part):
         ),
         Key(
             "balsara",
-            "Balsara factor: reduces artificial viscosity where the flow shears or "
-            "rotates; in 1-D, only where |div v| is below about 1e-4 c/H, with c the speed of sound",
+            "Balsara factor: reduces artificial viscosity where the flow shears or rotates; "
+            "in 1-D, only where |div v| is below about 1e-4 c/H, with c the speed of sound",
             kind=bool,
             default=True,
         ),

@@ -6,7 +6,7 @@ Eqs 6, 27, 28, 31 (Morris & Monaghan 1997; the source term as in Rosswog et al. 
 from typing import Annotated, NamedTuple
 
 from sph.compiled import larger
-from sph.model import Parameter, model
+from sph.model import model
 from sph.parts.viscosity import Switch
 
 
