@@ -131,7 +131,7 @@ def _axes(group: h5py.Group, version: int) -> tuple[dict[str, int], set[str]]:
 
 
 def fields_of(text: str) -> dict[str, tuple[int, bool]]:
-    """Return rank, and whether it may be missing, of each field named in `fields`. Raises Refused."""
+    """Return rank, and whether it may be missing, of each field in a JSON text."""
     try:
         found = {
             name: (int(rank), bool(remade)) for name, (rank, remade) in json.loads(text).items()

@@ -98,9 +98,8 @@ class Conductivity(Part):
         )  # fmt: skip
 
     def largest_courant(self):
-        return LARGEST / self.exchange.strength if self.exchange.strength else float(
-            "inf"
-        ), self.name
+        strength = self.exchange.strength
+        return (LARGEST / strength if strength else math.inf), self.name
 
     def criterion_words(self, criterion):
         if criterion == self.name:

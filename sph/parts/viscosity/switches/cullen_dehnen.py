@@ -21,12 +21,8 @@ TINY = 1e-300  # gas at rest is no shock: zero over zero is none
 class CullenDehnen(NamedTuple):
     """`min`, `max`: the range of alpha; `ell`: it decays over H/(2 ell v_sig)."""
 
-    min: Annotated[
-        float, Parameter("smallest alpha: each alpha decays to this value", at_least=0.0)
-    ]
-    max: Annotated[
-        float, Parameter("largest alpha, approached in strong compression", at_least=0.0)
-    ]
+    min: Annotated[float, LOWEST]
+    max: Annotated[float, HIGHEST]
     ell: Annotated[float, Parameter(DECAY, above=0.0)] = 0.05
 
     finds_shocks = True

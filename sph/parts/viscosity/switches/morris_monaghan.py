@@ -14,12 +14,8 @@ from sph.parts.viscosity import Switch
 class MorrisMonaghan(NamedTuple):
     """`min`: where alpha decays to; `max`: where strong compression drives it."""
 
-    min: Annotated[
-        float, Parameter("smallest alpha: each alpha decays to this value", at_least=0.0)
-    ]
-    max: Annotated[
-        float, Parameter("largest alpha, approached in strong compression", at_least=0.0)
-    ]
+    min: Annotated[float, LOWEST]
+    max: Annotated[float, HIGHEST]
 
     def alpha_rate(self, alpha, h, sound_speed, divergence):
         decay = (alpha - self.min) * 0.25 * sound_speed / h  # eq 27
