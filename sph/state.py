@@ -5,7 +5,7 @@ public names and units, lookup by name.
 """
 
 from collections.abc import Iterable, Mapping
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -96,6 +96,10 @@ class State:
         self.fields = tuple(field for field in fields if field.name in arrays)
         for field in self.fields:
             setattr(self, field.name, arrays[field.name])
+
+    if TYPE_CHECKING:  # the fields, which parts declare
+
+        def __getattr__(self, name: str) -> np.ndarray: ...
 
     @classmethod
     def at_start(

@@ -9,7 +9,7 @@ import numpy as np
 
 from sph.compiled import larger
 from sph.model import Parameter, model
-from sph.parts.viscosity import Switch
+from sph.parts.viscosity import HIGHEST, LOWEST, Switch
 
 DECAY = (
     "alpha decays in the time H/(2 ell v_sig), with H the support radius and v_sig the signal speed"

@@ -7,7 +7,7 @@ from typing import Annotated, NamedTuple
 
 from sph.compiled import larger
 from sph.model import model
-from sph.parts.viscosity import Switch
+from sph.parts.viscosity import HIGHEST, LOWEST, Switch
 
 
 @model(Switch)
