@@ -1,4 +1,4 @@
-"""Restarts that have nothing to do, and what is told of settings changed on the way."""
+"""Restarts that have nothing to do, and what is told of changed settings."""
 
 import hashlib
 import json
@@ -170,7 +170,7 @@ def test_settings_changed_on_the_way_are_told(run, tmp_path):
     changes = ["--set", "time.end=0.04", "--set", "physics.alpha=2.0"]
     second = sph_("restart", run.path, *changes)
     told = "physics.alpha = 2.0 (was 1.0) at t = 0.03"
-    assert f"Settings changed on the way: {told}." in second.stdout
+    assert f"Settings changed in restarts: {told}." in second.stdout
     found = json.loads(run.summary.read_text())
     assert found["settings_changed"] == [told]
     last = checkpoints.read(run.latest())
@@ -179,7 +179,7 @@ def test_settings_changed_on_the_way_are_told(run, tmp_path):
     third = sph_("restart", run.path, "--set", "time.end=0.05")  # it stays told
     assert told in third.stdout
     said = sph_("report", run.path, "-o", tmp_path / "report").stdout
-    assert f"changed its settings on the way: {told}." in said
+    assert f"changed its settings in restarts: {told}." in said
 
 
 def test_a_config_that_is_not_the_checkpoints_is_told(run):
