@@ -128,9 +128,9 @@ def endless_sum(simulation) -> NumericalError:
     """The error to raise where every particle's value is finite, but not their sum."""
     p, totals = simulation.particles, simulation.totals
     with np.errstate(all="ignore"):  # the very numbers that are looked for
-        name, each, remedy = _endless_energy(simulation) or (None, None, of_numbers(simulation))
-        if name is not None:
-            pass
+        remedy = of_numbers(simulation)
+        if found := _endless_energy(simulation):
+            name, each, remedy = found
         elif not np.isfinite(totals.kinetic_energy):
             name, each = "kinetic energy", (p.velocity**2).sum(axis=0)
         elif not np.isfinite(totals.internal_energy):

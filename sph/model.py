@@ -41,7 +41,7 @@ def model(base: type):
     return finish
 
 
-def parameters(kind: type) -> dict[str, tuple[Any, Parameter]]:
+def parameters(kind: Any) -> dict[str, tuple[Any, Parameter]]:
     """Type and declaration of each parameter of a model's class."""
     hints = get_type_hints(kind, include_extras=True)
     return {key: _declared(key, hints[key]) for key in kind._fields}

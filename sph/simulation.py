@@ -4,7 +4,7 @@ import numpy as np
 from numba.core.registry import cpu_target
 
 from sph import faults, passes, resolution, totals
-from sph.clock import Clock
+from sph.clock import STARTING, Clock
 from sph.integrators import leapfrog, step_size
 from sph.neighbours.order import number_of_blocks
 from sph.neighbours.search import Origin, Search
@@ -28,7 +28,7 @@ class Simulation:
     """
 
     def __init__(self, scene: Scene, particles: State, threads: int, clock: Clock):
-        with clock.phase("start of Numba"):
+        with clock.phase(STARTING):
             # its tables are filled on first use; here, so that no phase of a step pays for it
             cpu_target.target_context.refresh()
         self.scene = scene
