@@ -64,14 +64,13 @@ def best_skin(step: float, dimension: int) -> float:
     Lists that are to serve k steps need a skin of 2 (k - 1) step beside the room for growth: each
     step then pays 1/k of a build, and passes over candidates that grow as (1 + skin)^D.
     """
-    best, skin = np.inf, GROWTH
+    least, steps = np.inf, 1
     for k in range(1, 21):
-        wider = 2 * (k - 1) * step
-        cost = BUILD_OVER_PASSES / k + (1 + GROWTH + wider) ** dimension
-        if not cost < best:  # the costs are convex in k
+        cost = BUILD_OVER_PASSES / k + (1 + GROWTH + 2 * (k - 1) * step) ** dimension
+        if not cost < least:  # the costs are convex in k
             break
-        best, skin = cost, GROWTH + wider
-    return skin
+        least, steps = cost, k
+    return GROWTH + 2 * (steps - 1) * step
 
 
 class Search:
