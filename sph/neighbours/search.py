@@ -66,14 +66,13 @@ def best_skin(step: float, dimension: int) -> float:
     Lists that serve k steps need a skin of GROWTH + 2 (k - 1) step. Each step then costs 1/k of a
     build, and passes over candidates whose number grows as (1 + skin)^D.
     """
-    best, skin = np.inf, GROWTH
+    least, steps = np.inf, 1
     for k in range(1, 21):
-        wider = 2 * (k - 1) * step
-        cost = BUILD_OVER_PASSES / k + (1 + GROWTH + wider) ** dimension
-        if not cost < best:  # the costs are convex in k
+        cost = BUILD_OVER_PASSES / k + (1 + GROWTH + 2 * (k - 1) * step) ** dimension
+        if not cost < least:  # the costs are convex in k
             break
-        best, skin = cost, GROWTH + wider
-    return skin
+        least, steps = cost, k
+    return GROWTH + 2 * (steps - 1) * step
 
 
 class Search:
