@@ -5,6 +5,7 @@ sph_extensions/kernels/mine.py on the Python path is found as sph/kernels/mine.p
 no __init__.py, so several places may hold a share of it.
 """
 
+import functools
 import importlib
 import importlib.util
 import pkgutil
@@ -35,6 +36,7 @@ def load(package: str, name: str, folders: bool = False) -> ModuleType:
     return importlib.import_module(f"{places[name]}.{name}")
 
 
+@functools.cache
 def model_class(package: str, name: str) -> type:
     """The NamedTuple that a model's file defines: the one class with fields and formulas in it.
 
@@ -92,6 +94,12 @@ def _places(package: str, folders: bool) -> dict[str, str]:
                 found.setdefault(module.name, place)
     found.pop("base", None)
     return found
+
+
+def extension_folders() -> list[str]:
+    """The folders that make up `sph_extensions`, in the order of the Python path."""
+    spec = importlib.util.find_spec(EXTENSIONS)
+    return list(spec.submodule_search_locations or []) if spec else []
 
 
 def _exists(package: str) -> bool:

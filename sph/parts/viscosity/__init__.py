@@ -119,7 +119,7 @@ class Viscosity(Part):
         if balanced and dimension > 1:
             self.needs += ("curl_v",)
         if coefficient.finds_shocks:
-            from sph.parts.viscosity.shocks import find
+            from sph.parts.viscosity._shocks import find
 
             self.passes = (find,)
 
