@@ -110,7 +110,7 @@ def _walk(position, moves, support, identity, images, reached):
         near, far = (2 * a + 1, b), (2 * a + 2, b)
         if many_b > many_a:
             near, far = (a, 2 * b + 1), (a, 2 * b + 2)
-        # the pair that may meet first is looked at first: what it finds drops others
+        # the pair that may meet first is examined first, since its result excludes others
         if _earliest(boxes, motion, images, far[0], far[1], image, best) < _earliest(
             boxes, motion, images, near[0], near[1], image, best
         ):
