@@ -1,7 +1,6 @@
-"""The state: named arrays with one entry a particle, each declared once by the part that owns it.
+"""The state: named arrays with one entry per particle, each declared once by the part that owns it.
 
-Everything that handles arrays follows the declaration: mirror signs, reordering, checkpoints,
-public names and units, lookup by name.
+The declaration determines signs at mirrors, reordering, checkpoints, public names and units.
 """
 
 from collections.abc import Iterable, Mapping
@@ -11,7 +10,7 @@ import numpy as np
 
 
 class Public(NamedTuple):
-    """How other programs see a field: its name, the exponents of its unit, and what it is."""
+    """A field in the public part of a checkpoint: name, exponents of its unit, description."""
 
     name: str
     length: int
@@ -31,7 +30,7 @@ class Field(NamedTuple):
     name: str
     rank: int = 0
     stored: bool = True  # in checkpoints; else a work array
-    remade: bool = False  # a restart can compute it anew, so a checkpoint may lack it
+    remade: bool = False  # a restart can compute it, so it may be missing in a checkpoint
     above: float | None = None  # bounds of a physical value
     at_least: float | None = None
     integer: bool = False
@@ -46,7 +45,7 @@ COMMON = (
     Field(
         "id",
         integer=True,
-        public=Public("ParticleIDs", 0, 0, 0, 0, "What stays with a particle, from 1"),
+        public=Public("ParticleIDs", 0, 0, 0, 0, "Identification number, from 1"),
     ),
     Field("mass", above=0.0, public=Public("Masses", 0, 1, 0, 0, "Mass")),
     Field(
@@ -85,14 +84,14 @@ COMMON = (
 
 
 class State:
-    """N particles in D dimensions: one attribute a field, float64 but for the IDs, in code units.
+    """N particles in D dimensions: one attribute per field, float64 except IDs, in code units.
 
-    The memory order is that of the neighbour blocks and changes when they are rebuilt;
-    `id` (from 1) is what stays with a particle.
+    The memory order is that of the neighbour blocks and changes when these are rebuilt. `id` (from
+    1) identifies a particle during the whole run.
     """
 
     def __init__(self, fields: Iterable[Field], arrays: Mapping[str, np.ndarray]):
-        """The fields of which `arrays` has one, in the order of their declaration."""
+        """Create a state with the `fields` that are in `arrays`, in the order of declaration."""
         self.fields = tuple(field for field in fields if field.name in arrays)
         for field in self.fields:
             setattr(self, field.name, arrays[field.name])
@@ -105,7 +104,7 @@ class State:
     def at_start(
         cls, fields: Iterable[Field], position, velocity, mass, internal_energy
     ) -> "State":
-        """Particles with IDs 1 … N in the order given, and zeros where nothing is computed yet."""
+        """Return particles with IDs 1 … N in the given order; all other fields are zero."""
         dimension, n = position.shape
         given = {
             "position": position, "velocity": velocity, "mass": mass,
@@ -130,11 +129,11 @@ class State:
         return self.position.shape[0]
 
     def get(self, name: str) -> np.ndarray | None:
-        """The array of that name, or None where no part of the scene declares it."""
+        """Return the array of that name, or None if no part of the scene declares it."""
         return self.__dict__.get(name)
 
     def declare(self, fields: Iterable[Field]) -> list[str]:
-        """Have exactly these fields: others go, new ones are zeros. Returns new names."""
+        """Keep exactly these fields; add missing ones as zeros and return their names."""
         fields, known = tuple(fields), {field.name for field in self.fields}
         for name in known - {field.name for field in fields}:
             delattr(self, name)
@@ -145,20 +144,20 @@ class State:
         return [field.name for field in new]
 
     def arrays(self) -> dict[str, np.ndarray]:
-        """The arrays that a checkpoint stores, by name."""
+        """Return the arrays that a checkpoint stores, by name."""
         return {field.name: getattr(self, field.name) for field in self.fields if field.stored}
 
     def subset(self, indices: np.ndarray) -> "State":
-        """A copy of the stored fields of the particles of these indices, in their order."""
+        """Return a copy of the stored fields for the particles `indices`, in that order."""
         arrays = self.arrays().items()
         chosen = {name: np.ascontiguousarray(array[..., indices]) for name, array in arrays}
         return State(self.fields, chosen)
 
     def by_id(self) -> "State":
-        """A copy ordered by ID, to compare two runs or to plot."""
+        """Return a copy in order of ID, to compare runs or to plot."""
         return self.subset(np.argsort(self.id, kind="stable"))
 
     def reorder(self, order: np.ndarray, names: Iterable[str]) -> None:
-        """Put the arrays of those names into another memory order, (N,) indices."""
+        """Reorder the arrays `names` in memory by `order`, (N,) indices."""
         for name in names:
             setattr(self, name, getattr(self, name).take(order, axis=-1))

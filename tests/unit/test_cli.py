@@ -220,7 +220,7 @@ def test_restart_says_that_it_passes_over_a_damaged_checkpoint(done, tmp_path):
     result = sph_("restart", run)
     assert result.exit_code == 0
     assert (
-        "checkpoint_000004.h5 is passed over (cannot be read): going on from checkpoint_000003"
+        "checkpoint_000004.h5 is skipped (it cannot be read): continuing from checkpoint_000003"
         in result.stderr
     )
     assert hashes(run) == hashes(done[0])
@@ -385,7 +385,7 @@ def test_what_is_no_good_checkpoint(done, tmp_path):
     bad.write_bytes(good)
     with h5py.File(bad, "a") as file:
         file["Checkpoint"].attrs["format_version"] = 99
-    assert_told(sph_("restart", bad), 4, "a newer format (99)", "Try: a newer sph")
+    assert_told(sph_("restart", bad), 4, "a newer format (99)", "Try: a newer version")
     bad.write_bytes(good)
     assert_told(sph_("restart", bad), 4, "not in a run directory", "-o DIR")
 
@@ -426,7 +426,7 @@ def test_a_signal_in_a_run_leaves_a_checkpoint(number, config, tmp_path):
     code, out, err = finished(process)
     assert (code, out) == (75, "")
     assert "stopped by " + {2: "Ctrl-C", 15: "SIGTERM"}[number] in err
-    assert "`sph restart run` goes on from there" in err
+    assert "`sph restart run` continues the run" in err
     assert "Traceback" not in err
     summary = json.loads((tmp_path / "run" / "summary.json").read_text())
     assert summary["status"] == "stopped"

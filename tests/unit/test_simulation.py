@@ -198,7 +198,7 @@ def test_a_bad_particle_is_named(begin, name, value):
     words = name.replace("_", " ")
     assert f"{words} of particle {simulation.particles.id[7]} at (" in str(caught.value)
     assert f"{value}" in str(caught.value)
-    assert "; 1 particle(s) are so" in str(caught.value)
+    assert "; 1 particle(s) affected" in str(caught.value)
     assert "Try: a smaller physics.C" in str(caught.value)
 
 

@@ -38,7 +38,7 @@ PROBLEMS = {
 every_problem = pytest.mark.parametrize("problem", PROBLEMS.values(), ids=PROBLEMS.keys())
 
 
-# Toro (2009), table 4.2 and the two shock tubes of the seed. Half a unit of the last digit printed
+# Toro (2009), table 4.2 and two shock tubes more. Half a unit of the last digit printed
 # is the tolerance.
 @pytest.mark.parametrize(
     ("left", "right", "pressure", "velocity", "digit"),

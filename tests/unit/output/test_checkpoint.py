@@ -129,7 +129,7 @@ def test_hash_sees_values_names_types_and_shapes():
 
 
 def test_missing_file(tmp_path):
-    refused(tmp_path / "no.h5", "there is no checkpoint")
+    refused(tmp_path / "no.h5", "checkpoint not found")
 
 
 def test_directory(tmp_path):

@@ -12,7 +12,7 @@ from sph.parts.viscosity import HIGHEST, LOWEST, Switch
 
 @model(Switch)
 class MorrisMonaghan(NamedTuple):
-    """`min`: where alpha decays to; `max`: where strong compression drives it."""
+    """`min`: value to which alpha decays; `max`: value that alpha approaches in strong shocks."""
 
     min: Annotated[float, LOWEST]
     max: Annotated[float, HIGHEST]
