@@ -16,7 +16,7 @@ TINY_C = 1e-3  # for smaller physics.C, short steps are intended
 
 SETS = {
     "signal_speed": "signal speed",
-    "energy": "heating or cooling, u/|du/dt|",
+    "energy": "u/|du/dt|, the rate of change of internal energy",
     "acceleration": "acceleration",
     "support": "rate of change of the support radius",
     "approach": "approach to a particle that is not a neighbour yet",
@@ -91,7 +91,7 @@ def longer_steps(simulation) -> str:
     """Return what to try if steps have become too short, by the criterion of the next step."""
     scene, criterion = simulation.scene, simulation.limit.criterion
     if criterion == "energy":
-        return "physics.energy_limit = false, which removes the limit for heating and cooling"
+        return "physics.energy_limit = false, which removes the limit u/|du/dt|"
     by_part = _remedies(scene, "short steps", criterion)
     if criterion == "acceleration" and by_part:
         return by_part[0]

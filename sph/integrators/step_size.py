@@ -79,7 +79,7 @@ def _smallest(support, signal_speed, energy, energy_rate, acceleration, identity
         by_signal = 2.0 * support[i] / signal_speed[i]
         if by_signal < best or (by_signal == best and identity[i] < particle):
             best, particle, criterion = by_signal, identity[i], 0
-        # u = 0 does not limit the step: it cannot fall, and any heating is relatively large
+        # u = 0 does not limit the step: it cannot fall, and any gain is relatively large
         if energy_limit and energy[i] > 0.0:
             by_energy = energy[i] / abs(energy_rate[i])
             if by_energy < best or (by_energy == best and identity[i] < particle):
