@@ -13,7 +13,7 @@ The class attribute `suits_gravity` tells whether it rests in equilibrium with a
 from sph import registry
 from sph.model import Model
 from sph.part import Key, Part, Pass
-from sph.parts.conductivity.contacts import contacts
+from sph.parts.conductivity._contacts import contacts
 from sph.state import Field
 
 FOLDER = "sph.parts.conductivity"
