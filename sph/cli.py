@@ -175,15 +175,15 @@ def new(problem, target):
 def list_choices():
     """List problems, kernels, schemes, other models and stress cases."""
     from sph import registry
+    from sph.config.physics import model_folders
     from sph.stress.case import load as stress_cases
 
-    for package in (
-        "problems", "kernels", "schemes", "eos", "viscosity.switches", "conductivity", "external",
-        "heating",
-    ):  # fmt: skip
-        click.echo(f"{package}:")
-        for name in registry.names(f"sph.{package}"):
-            module = registry.load(f"sph.{package}", name)
+    top = {f"sph.{name}": name for name in ("problems", "formulations", "kernels", "eos")}
+    for package, title in (top | model_folders()).items():
+        click.echo(f"{title}:")
+        folders = package == "sph.formulations"
+        for name in registry.names(package, folders):
+            module = registry.load(package, name, folders)
             click.echo(f"  {name:24s} {docstring(module).strip().splitlines()[0]}")
     click.echo("stress cases:")
     for case in stress_cases():

@@ -262,12 +262,16 @@ def test_what_new_writes_runs(tmp_path):
 def test_list_names_every_choice():
     result = sph_("list")
     assert result.exit_code == 0
-    sections = dict(re.findall(r"^(\w+):\n((?:  .*\n)+)", result.stdout, re.MULTILINE))
-    for section in (
-        "problems", "kernels", "schemes", "eos", "conductivity", "external", "heating",
-    ):  # fmt: skip
+    sections = dict(re.findall(r"^([\w.]+):\n((?:  .*\n)+)", result.stdout, re.MULTILINE))
+    for section, package in {
+        "problems": "sph.problems", "formulations": "sph.formulations", "kernels": "sph.kernels",
+        "eos": "sph.eos", "schemes": "sph.formulations.gas.schemes",
+        "viscosity.switches": "sph.parts.viscosity.switches",
+        "conductivity": "sph.parts.conductivity", "external": "sph.parts.external",
+        "heating": "sph.parts.heating",
+    }.items():  # fmt: skip
         named = [line.split()[0] for line in sections[section].splitlines()]
-        assert named == registry.names(f"sph.{section}")
+        assert named == registry.names(package, folders=section == "formulations")
         assert all(len(line.split()) > 3 for line in sections[section].splitlines())
 
 
