@@ -3,7 +3,10 @@ import contextlib
 import errno
 import fcntl
 import io
+import json
+import math
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -14,8 +17,17 @@ import h5py
 import numpy as np
 import pytest
 
+from sph import config as configuration
+from sph import restarting, runner
 from sph.errors import FileError
+from sph.integrators import step_size
 from sph.output import checkpoint, files, stored
+from sph.output.history import read as read_history
+from sph.output.run_directory import RunDirectory
+from sph.progress import Lines
+
+
+REFERENCE = Path(__file__).parents[2] / "reference"
 
 
 @pytest.fixture
@@ -289,6 +301,12 @@ def linked(link):
     return change
 
 
+def listed(group, name, entry):
+    """Give the list of fields that entry for `name`; None takes it out."""
+    fields = json.loads(group.attrs["fields"]) | {name: entry}
+    group.attrs["fields"] = json.dumps({name: one for name, one in fields.items() if one})
+
+
 STRANGE = {
     "longer": (replaced("mass", data=np.ones(51)), "mass has the shape (51,), expected (50,)"),
     "half": (replaced("omega", data=np.ones(25)), "omega has the shape (25,)"),
@@ -304,9 +322,9 @@ STRANGE = {
     "no step": (replaced("next_step", data=0.0), "next_step = 0.0"),
     "skin": (replaced("list_skin", data=1e9), "list_skin = 1000000000.0"),
     "IDs": (replaced("id", data=np.ones(50, int)), "IDs are not all positive"),
-    "nan": (replaced("velocity", data=np.full((2, 50), np.nan)), "velocity has non-finite"),
-    "support": (replaced("support", data=np.zeros(50)), "support has values that are not positive"),
-    "cold": (replaced("internal_energy", data=-np.ones(50)), "internal_energy has negative"),
+    "nan": (replaced("velocity", data=np.full((2, 50), np.nan)), "velocity is not finite"),
+    "support": (replaced("support", data=np.zeros(50)), "support is not above 0"),
+    "cold": (replaced("internal_energy", data=-np.ones(50)), "internal_energy is below 0"),
     "away": (replaced("list_position", data=np.full((2, 50), 9.0)), "list_position is outside"),
     "far": (replaced("position", data=np.full((2, 50), 1e200)), "position is outside the domain"),
     "3-D": (replaced("position", data=np.zeros((3, 50))), "position has the shape (3, 50)"),
@@ -323,7 +341,10 @@ STRANGE = {
     "soft": (linked(h5py.SoftLink("/PartType0/Masses")), "mass is a link"),
     "more": (lambda group: group.create_dataset("more", data=1.0), "not hold the datasets"),
     "less": (lambda group: group.pop("mass"), "mass missing"),
-    "alpha": (lambda group: group.create_dataset("alpha", data=np.ones(50)), "alpha is present"),
+    "unlisted": (lambda group: (group.pop("mass"), listed(group, "mass", None)),
+                 "mass is missing, which contradicts"),
+    "alpha": (lambda group: (group.create_dataset("alpha", data=np.ones(50)),
+                             listed(group, "alpha", [0, False])), "alpha is present"),
     "format": (lambda group: group.attrs.update(format_version=[1, 2]), "format_version"),
     "lineage": (lambda group: group.attrs.update(lineage="{}"), "lineage"),
     "text array": (lambda group: group.attrs.update(configuration=["a"] * 9), "configuration"),
@@ -383,6 +404,70 @@ def test_fields_written_are_those_of_the_scene(tmp_path, make_state):
     assert named == {name: (one.rank, one.remade) for name, one in fields.items()}
 
 
+HOSTILE = {
+    "no JSON": "{",
+    "deep": "[" * 100_000,
+    "a number": "3",
+    "a list": '[["mass", 0, false]]',
+    "a text": '"mass"',
+    "null": "null",
+    "a rank alone": '{"mass": 0}',
+    "no rank": '{"mass": []}',
+    "three entries": '{"mass": [0, false, 1]}',
+    "a text for a rank": '{"mass": ["many", false]}',
+    "infinite": '{"mass": [Infinity, false]}',
+    "NaN": '{"mass": [NaN, false]}',
+    "rank 7": '{"mass": [7, false]}',
+    "rank 3": '{"mass": [3, false]}',
+    "rank -1": '{"mass": [-1, false]}',
+    "slash": '{"mass": [0, false], "../PartType0/Masses": [0, false]}',
+    "inner slash": '{"a/b": [0, false]}',
+    "root": '{"/": [0, false]}',
+    "dot": '{".": [0, false]}',
+    "empty name": '{"": [0, false]}',
+    "NUL": '{"a\\u0000b": [0, false]}',
+    "line": '{"mass\\n": [0, false]}',
+    "surrogate": '{"\\udcff": [0, false]}',
+    "attribute": '{"__class__": [0, false]}',
+    "long": json.dumps({"a" * 62: [0, False]}),
+    "a number of the run": '{"time": [0, false]}',
+    "a list of the search": '{"list_support": [0, false]}',
+    "an energy": '{"energy_added": [0, false]}',
+}
+
+
+@pytest.mark.parametrize("what", HOSTILE)
+def test_a_hostile_list_of_fields_is_refused(what):
+    with pytest.raises(stored.Refused, match="its list of fields") as caught:
+        stored.fields_of(HOSTILE[what])
+    assert caught.value.kind == "foreign"
+    assert str(caught.value).isprintable()
+
+
+def test_a_list_of_fields_is_read():
+    assert stored.fields_of('{"mass": [0, false], "a_b2": [2, true]}') == {
+        "mass": (0, False),
+        "a_b2": (2, True),
+    }
+
+
+@pytest.mark.parametrize(
+    ("named", "words"),
+    [
+        ({"mass": [1, False]}, "the field mass is of rank 1"),
+        ({"velocity": [7, False]}, "wrong name or rank: 'velocity'"),
+        ({"more": [0, False]}, "more missing"),
+        ({"more/less": [0, False]}, "wrong name or rank: 'more/less'"),
+    ],
+)
+def test_a_file_with_a_wrong_list_of_fields_is_refused(written, named, words):
+    with h5py.File(written, "r+") as file:
+        attributes = file["Checkpoint"].attrs
+        attributes["fields"] = json.dumps(json.loads(attributes["fields"]) | named)
+    seal(written)
+    refused(written, words)
+
+
 @pytest.mark.parametrize(("version", "word"), [(0, "an older"), (1000, "a newer")])
 def test_other_formats(written, version, word):
     with h5py.File(written, "r+") as file:
@@ -410,7 +495,7 @@ def in_another_process(path, preparation):
     """Write a larger state to `path` in a process of its own, after `preparation`."""
     program = f"""
         import os, resource, signal, sys
-        sys.path.insert(0, {str(Path(__file__).parent)!r})
+        sys.path[:0] = {[str(Path(__file__).parent), str(REFERENCE)]!r}
         from conftest import random_state
         from sph.errors import FileError
         from sph.output import checkpoint, files, layout
@@ -453,3 +538,111 @@ def test_full_disk_leaves_the_old_checkpoint_and_says_so(written, megabytes):
     assert process.stderr.startswith(f"cannot write {written}: File too large.\nTry: ")
     assert written.read_bytes() == whole
     assert os.listdir(written.parent) == [written.name]
+
+
+# --- restarts with the energy budget ---
+
+# Two streams part so fast that a step takes more than half of the internal energy, which is kept
+# positive, beside a source: so energy is injected, added, and drifts.
+PARTING = """
+[problem]
+name = "shock_tube"
+n = 60
+boundary = "open"
+left = { density = 1.0, velocity = -10.0, pressure = 0.7 }
+right = { density = 1.0, velocity = 10.0, pressure = 0.7 }
+[physics]
+energy_limit = false
+C = 0.4
+max_energy_drift = 10.0
+heating = { name = "relaxation", energy = 1.0, time = 0.1 }
+[time]
+end = 0.04
+[output]
+interval = 0.01
+[run]
+threads = 1
+"""
+OF_THE_BUDGET = ("energy_injected", "energy_added", "energy_drift")
+
+
+@pytest.fixture(scope="module")
+def long_steps():
+    """Without the bound on the change of supports, steps are long enough for the rule to act."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(step_size, "SUPPORT_CHANGE", math.inf)
+        yield
+
+
+@pytest.fixture(scope="module")
+def parting(tmp_path_factory, long_steps):
+    """The run, to its end, in one go."""
+    directory = RunDirectory.create(tmp_path_factory.mktemp("budget") / "run")
+    runner.run(configuration.from_text(PARTING), directory, Lines())
+    past = read_history(directory.history)
+    (row,) = np.flatnonzero(past["step"] == checkpoint.read(directory.checkpoint_path(2)).step)
+    assert all(past[name][row] != 0.0 for name in OF_THE_BUDGET)  # else there is none to keep
+    return directory
+
+
+def as_format_1(path):
+    """Make of a checkpoint what an earlier version would have written."""
+    old = checkpoint.read(path)
+    old.budget = None
+    checkpoint.write(path, old)
+    with h5py.File(path, "r+") as file:
+        del file["Checkpoint"].attrs["fields"]
+        assert file["Checkpoint"].attrs["format_version"] == 1
+        assert not {*stored.ENERGIES} & {*file["Checkpoint"]}
+    seal(path)
+
+
+def assert_goes_on_as(past, uninterrupted):
+    """Every row has the bits of the run that was not interrupted, but for what a clock says."""
+    rows = uninterrupted["step"] >= past["step"][0]
+    assert past.keys() == uninterrupted.keys()
+    for name in past.keys() - {"wall_seconds", "cpu_seconds"}:
+        # a history that begins with a checkpoint does not know what set the step then
+        first = int(name.startswith("limiter") and past["step"][0] > 0)
+        assert past[name][first:].tolist() == uninterrupted[name][rows][first:].tolist(), name
+
+
+@pytest.mark.slow
+def test_a_checkpoint_of_format_1_goes_on_with_the_budget_of_the_history(parting, tmp_path):
+    run = RunDirectory(shutil.copytree(parting.path, tmp_path / "run"))
+    source = run.checkpoint_path(2)
+    whole = checkpoint.read(source)
+    as_format_1(source)
+    old = checkpoint.read(source)
+    assert old.budget is None
+    assert checkpoint.state_hash(old.particles.arrays()) == checkpoint.state_hash(
+        whole.particles.arrays()
+    )
+    restarting.restart(source, [], None, Lines())
+    assert_goes_on_as(read_history(run.history), read_history(parting.history))
+    last = checkpoint.read(run.checkpoint_path(4))
+    assert last.budget == checkpoint.read(parting.checkpoint_path(4)).budget
+
+
+@pytest.mark.slow
+def test_a_lone_checkpoint_goes_on_with_the_budget_that_it_holds(parting, tmp_path):
+    lone = tmp_path / "lone.h5"
+    shutil.copy(parting.checkpoint_path(2), lone)
+    _, run = restarting.restart(lone, [], tmp_path / "elsewhere", Lines())
+    past = read_history(run.history)
+    assert past["step"][0] == checkpoint.read(lone).step
+    assert_goes_on_as(past, read_history(parting.history))
+    last = checkpoint.read(run.checkpoint_path(2))
+    assert last.budget == checkpoint.read(parting.checkpoint_path(4)).budget
+
+
+@pytest.mark.slow
+def test_a_lone_checkpoint_of_format_1_begins_the_budget_anew(parting, tmp_path):
+    lone = tmp_path / "lone.h5"
+    shutil.copy(parting.checkpoint_path(2), lone)
+    as_format_1(lone)
+    _, run = restarting.restart(lone, [], tmp_path / "elsewhere", Lines())
+    past, uninterrupted = read_history(run.history), read_history(parting.history)
+    assert [past[name][0] for name in OF_THE_BUDGET] == [0.0, 0.0, 0.0]
+    rows = uninterrupted["step"] >= checkpoint.read(lone).step
+    assert past["total_energy"].tolist() == uninterrupted["total_energy"][rows].tolist()
