@@ -38,8 +38,9 @@ def load(package: str, name: str, folders: bool = False) -> ModuleType:
 def model_class(package: str, name: str) -> type:
     """The NamedTuple that a model's file defines: the one class with fields and formulas in it.
 
-    Raises TypeError where its name is not its own in the whole program: Numba tells named tuples
-    apart by the name of the class and of the fields, so two alike would share their formulas.
+    Raises TypeError where it is not decorated with `sph.model.model`, or where its name is not its
+    own in the whole program: Numba tells named tuples apart by the name of the class and of the
+    fields, so two alike would share their formulas.
     """
     module = load(package, name)
     (found,) = (
@@ -49,6 +50,11 @@ def model_class(package: str, name: str) -> type:
         and hasattr(kind, "_fields")
         and kind.__module__ == module.__name__
     )
+    if not hasattr(found, "issues"):
+        raise TypeError(
+            f"{module.__name__}: decorate {found.__name__} with @model(Base) of sph.model, where "
+            f"Base is the class in {package} that has what a model may leave out"
+        )
     other = _known.setdefault((found.__name__, found._fields), module.__name__)
     if other != module.__name__:
         raise TypeError(
