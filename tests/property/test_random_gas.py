@@ -63,7 +63,7 @@ def simulation(state: InitialState, dimension, boundary, scene, **physics):
     config = dataclasses.replace(
         config,
         problem=Given(**config.problem.model_dump()),
-        physics=configuration.Physics(**settings),
+        physics=type(config.physics)(**settings),
     )
     GIVEN[:] = [state]
     clock = Clock()
