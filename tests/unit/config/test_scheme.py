@@ -2,7 +2,8 @@
 
 import pytest
 
-from sph import config, eos
+from sph import config, eos, registry
+from sph.config.physics import model_folders
 from sph.errors import ConfigError
 from sph.parts.external import External
 from sph.scene import Scene
@@ -25,6 +26,12 @@ def physics(scheme, gas):
     return config.from_text(
         f'[problem]\nname = "uniform"\n[physics]\nscheme = "{scheme}"\n{gas}\n', "a test"
     ).physics
+
+
+@pytest.mark.parametrize("folder", ["sph.kernels", "sph.eos", *model_folders()])
+def test_every_file_in_a_folder_of_models_is_a_model(folder):
+    for name in registry.names(folder):
+        assert registry.model_class(folder, name).name == name
 
 
 def test_a_model_without_the_base_of_its_folder_is_an_error_that_says_so(tmp_path, monkeypatch):
