@@ -175,36 +175,19 @@ def new(problem, target):
 def list_choices():
     """List problems, kernels, schemes, other models and stress cases."""
     from sph import registry
+    from sph.config.physics import model_folders
     from sph.stress.case import load as stress_cases
 
-    for title, package in _choices().items():
+    top = {f"sph.{name}": name for name in ("problems", "formulations", "parts", "kernels", "eos")}
+    for package, title in (top | model_folders()).items():
         click.echo(f"{title}:")
-        folders = package in FOLDERS
+        folders = package in ("sph.formulations", "sph.parts")
         for name in registry.names(package, folders):
             module = registry.load(package, name, folders)
             click.echo(f"  {name:24s} {docstring(module).strip().splitlines()[0]}")
     click.echo("stress cases:")
     for case in stress_cases():
         click.echo(f"  {case.name:24s} {case.title}")
-
-
-# Whose choices are folders, not files.
-FOLDERS = ("sph.formulations", "sph.parts")
-
-
-def _choices() -> dict[str, str]:
-    """Return the folders whose files or folders a configuration can name, by title."""
-    from sph import registry
-    from sph.config import physics
-
-    found = {
-        "problems": "sph.problems", "kernels": "sph.kernels", "equations of state": "sph.eos",
-        **{package.removeprefix("sph."): package for package in FOLDERS},
-    }  # fmt: skip
-    for name in registry.names("sph.formulations", folders=True):
-        for kind in physics.table(name).kinds:
-            found |= {f"physics.{key.name}": key.models for key in kind.keys if key.models}
-    return found
 
 
 def _print_result(result, target, strict):

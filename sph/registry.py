@@ -40,8 +40,9 @@ def load(package: str, name: str, folders: bool = False) -> ModuleType:
 def model_class(package: str, name: str) -> type:
     """Return the NamedTuple that a model's file defines.
 
-    Raises TypeError if another model has equal class and field names: Numba distinguishes named
-    tuples only by these, so both models would share their formulas.
+    Raises TypeError if the class is not decorated with `sph.model.model`, or if another model has
+    equal class and field names: Numba distinguishes named tuples only by these, so both models
+    would share their formulas.
     """
     module = load(package, name)
     (found,) = (
@@ -51,6 +52,11 @@ def model_class(package: str, name: str) -> type:
         and hasattr(kind, "_fields")
         and kind.__module__ == module.__name__
     )
+    if not hasattr(found, "issues"):
+        raise TypeError(
+            f"{module.__name__}: decorate {found.__name__} with @model(Base) of sph.model, where "
+            f"Base is the class in {package} that has what a model may leave out"
+        )
     other = _known.setdefault((found.__name__, found._fields), module.__name__)
     if other != module.__name__:
         raise TypeError(

@@ -33,7 +33,7 @@ class Field(NamedTuple):
     remade: bool = False  # a restart can compute it, so it may be missing in a checkpoint
     above: float | None = None  # bounds of a physical value
     at_least: float | None = None
-    integer: bool = False
+    integer: bool = False  # the ID alone
     public: Public | None = None
 
     def shape(self, dimension: int, number: int) -> tuple[int, ...]:

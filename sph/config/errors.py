@@ -109,7 +109,10 @@ def _is_table(bare: Any) -> bool:
 
 
 def _bounds(said: list[Any]) -> str:
-    found = {name: getattr(one, name) for one in said for name in _BOUNDS if hasattr(one, name)}
+    # as text without ".0": `typing` takes equal types for one, so 0.0 may come back as 0
+    found = {
+        name: f"{getattr(one, name):.15g}" for one in said for name in _BOUNDS if hasattr(one, name)
+    }
     if {"ge", "le"} <= found.keys():
         return f" from {found['ge']} to {found['le']}"
     parts = [f"{words} {found[name]}" for name, words in _BOUNDS.items() if name in found]

@@ -1,6 +1,7 @@
 """The table [physics]: the keys of every formulation, and those that parts declare."""
 
 import functools
+import re
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 from pydantic import Field, create_model, model_validator
@@ -135,6 +136,14 @@ def chosen(raw: dict[str, Any]) -> type[Physics]:
     name = raw.get("formulation", DEFAULT)
     known = registry.names(FORMULATIONS, folders=True)
     return table(name if name in known else DEFAULT)
+
+
+def model_folders() -> dict[str, str]:
+    """Return the folder of models of each key, e.g. "sph.parts.heating", with its short name."""
+    known = registry.names(FORMULATIONS, folders=True)
+    keys = [key for name in known for kind in table(name).kinds for key in kind.keys]
+    folders = [key.models for key in keys if key.models]
+    return {one: re.sub(r"sph\.(parts|formulations\.\w+)\.", "", one) for one in folders}
 
 
 def _field(key: Key) -> tuple[Any, Any]:

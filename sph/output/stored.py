@@ -32,7 +32,9 @@ FIELDS = {
     **dict.fromkeys(("position", "velocity", "acceleration"), 2),
 }
 OF_SOME_SCENES = ("alpha", "alpha_rate", "pressure")
+# Names in the list of fields, and their entries: rank, and whether a restart can compute it anew.
 NAME = re.compile(r"[a-z][a-z0-9_]{0,60}")
+ENTRIES = [(rank, remade) for rank in range(3) for remade in (False, True)]
 INTEGERS = ("id", "step")
 TEXTS = ("configuration", "lineage", "sha256", "configuration_sha256")
 LATER_TEXTS = ("computed_by", "fields")  # missing in the oldest files
@@ -133,16 +135,14 @@ def _axes(group: h5py.Group, version: int) -> tuple[dict[str, int], set[str]]:
 def fields_of(text: str) -> dict[str, tuple[int, bool]]:
     """Return rank, and whether it may be missing, of each field in a JSON text."""
     try:
-        found = {
-            name: (int(rank), bool(remade)) for name, (rank, remade) in json.loads(text).items()
-        }
+        found = {name: tuple(entry) for name, entry in json.loads(text).items()}
     except (ValueError, TypeError, AttributeError, RecursionError):
         raise Refused("foreign", "its list of fields is not one") from None
     reserved = {*SCALARS, *ENERGIES, *LISTS}
-    for name, (rank, _) in found.items():
-        if not NAME.fullmatch(name) or name in reserved or not 0 <= rank <= 2:
-            raise Refused("foreign", f"its list of fields has {name[:60]!a} of rank {rank}")
-    return found
+    for name, entry in found.items():
+        if not NAME.fullmatch(name) or name in reserved or entry not in ENTRIES:
+            raise Refused("foreign", f"its list of fields has a wrong name or rank: {name[:60]!a}")
+    return {name: (int(rank), bool(remade)) for name, (rank, remade) in found.items()}
 
 
 def _datasets(

@@ -7,6 +7,7 @@ checked here.
 import numpy as np
 
 from sph.neighbours.lists import MAX_PARTICLES
+from sph.output import stored
 
 # Far above the skin of any run, which is below 1 (sph.neighbours.search.best_skin).
 MOST_SKIN = 10.0
@@ -19,11 +20,13 @@ def faults_of_shape(checkpoint) -> list[str]:
     n, D = particles.id.size, config.problem.dimension
     if not 1 <= n <= MAX_PARTICLES:
         return [f"it has {n} particles, expected 1 to {MAX_PARTICLES}"]
-    found = []
-    for name, array in _arrays(checkpoint).items():
-        expected = (D,) * (array.ndim - 1) + (n,)
-        if array.shape != expected:
-            found.append(f"{name} has the shape {array.shape}, expected {expected}")
+    expected = {field.name: field.shape(D, n) for field in particles.fields}
+    expected |= {"list_position": (D, n), "list_support": (n,)}
+    found = [
+        f"{name} has the shape {array.shape}, expected {expected[name]}"
+        for name, array in _arrays(checkpoint).items()
+        if array.shape != expected[name]
+    ]
     ids = np.sort(particles.id)
     if ids[0] < 1 or np.any(ids[1:] == ids[:-1]):
         found.append("its particle IDs are not all positive and unique")
@@ -60,7 +63,13 @@ def _bad_scalars(checkpoint):
         "next_step": np.isfinite(c.next_step) and c.next_step > 0.0,
         "list_skin": 0.0 <= c.list_skin <= MOST_SKIN,
     }
-    return [(name, getattr(c, name)) for name, fine in good.items() if not fine]
+    bad = [(name, getattr(c, name)) for name, fine in good.items() if not fine]
+    energies = [] if c.budget is None else [c.budget.injected, c.budget.added, *c.budget.baseline]
+    return bad + [
+        (name, value)
+        for name, value in zip(stored.ENERGIES, energies, strict=False)
+        if not np.isfinite(value)
+    ]
 
 
 def _faults_of_place(checkpoint) -> list[str]:

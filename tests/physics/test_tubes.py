@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from sph.integrators.step_size import Bounds
+from sph.parts.viscosity import Viscosity
 
 # An independent dense transcription of the equations gives .0048/.0123/.0055 at N = 400 with the
 # walls at the lattice's own ends; the bounds leave 8 % for the set-up at the walls in density
@@ -62,7 +62,7 @@ def test_courant_number_near_the_limit_of_stability_shows_in_the_energy(run, mon
     assert drift(0.15) == pytest.approx(1.0e-5, rel=0.06)
     assert drift(0.075) == pytest.approx(5.2e-6, rel=0.06)
     assert drift(0.3) < 1e-4  # ten times that of 0.15 is still far below the error
-    monkeypatch.setattr(Bounds, "held", property(lambda bounds: (bounds.courant, "signal_speed")))
+    monkeypatch.setattr(Viscosity, "largest_courant", lambda part: (np.inf, ""))
     assert drift("0.30") == pytest.approx(6.6e-3, rel=0.02)  # another run: `run` keeps them by key
 
 

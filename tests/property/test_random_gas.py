@@ -63,7 +63,7 @@ def simulation(state: InitialState, dimension, boundary, scene, **physics):
     config = dataclasses.replace(
         config,
         problem=Given(**config.problem.model_dump()),
-        physics=configuration.Physics(**settings),
+        physics=type(config.physics)(**settings),
     )
     GIVEN[:] = [state]
     clock = Clock()
@@ -84,7 +84,7 @@ def check(simulation):
     force, power = exchanged(simulation)
     if simulation.scene.domain.boundaries[0] != "mirror":  # walls take momentum up
         assert (abs(p.acceleration @ p.mass) <= ROUND_OFF * force).all()
-    v = simulation._velocity
+    v = p.predicted_velocity
     work = (p.mass * ((v * p.acceleration).sum(axis=0) + p.energy_rate)).sum()
     assert abs(work) <= ROUND_OFF * power
 
@@ -92,15 +92,15 @@ def check(simulation):
 def exchanged(simulation):
     """Sums over all pairs of what bounds their force, and its work: the size round-off has."""
     p, scene = simulation.particles, simulation.scene
-    kernel, dim = scene.models.kernel, (0,) * scene.dimension
+    kernel, dim = scene.formulation.models.kernel, (0,) * scene.dimension
     D = scene.dimension
-    term = abs(simulation._pressure_term)
-    if scene.sums_pressure:  # times u - shift of the partner, at most
-        term = term * (simulation._energy.max() + abs(simulation._energy_shift).max())
-    viscous = 3.0 * simulation._signal_speed**2 / p.density
-    conducted = np.sqrt(simulation._energy.max()) * simulation._energy.max() / p.density
+    term = abs(p.pressure_term)
+    if scene.formulation.scheme.sums_pressure:  # times u - shift of the partner, at most
+        term = term * (p.predicted_energy.max() + abs(p.energy_shift).max())
+    viscous = 3.0 * p.signal_speed**2 / p.density
+    conducted = np.sqrt(p.predicted_energy.max()) * p.predicted_energy.max() / p.density
     total = term + viscous
-    velocity = np.linalg.norm(simulation._velocity, axis=0)
+    velocity = np.linalg.norm(p.predicted_velocity, axis=0)
     force = power = 0.0
     for sign, offset in zip(*scene.domain.images, strict=True):
         image = sign[:, None] * p.position + offset[:, None]
@@ -114,7 +114,7 @@ def exchanged(simulation):
         push = pair * (total[:, None] + total)
         force += push.sum()
         power += (push * (velocity[:, None] + velocity)).sum()
-        if scene.conducts:
+        if scene.formulation.exchanges:
             power += (pair * (conducted[:, None] + conducted)).sum()
     return force, power
 

@@ -50,7 +50,7 @@ def begin(simulate):
         config = dataclasses.replace(
             config,
             problem=Placed(**settings),
-            physics=configuration.Physics(**(config.physics.model_dump() | physics)),
+            physics=type(config.physics)(**(config.physics.model_dump() | physics)),
         )
         return simulate(config)
 
@@ -243,10 +243,13 @@ def test_counted_passes_run_away_at_a_jump_of_mass_unless_it_is_solved_for(begin
     def farthest(unsettled):
         simulation = begin(x[None], "periodic", mass)
         models = simulation.scene.formulation.models
-        models = models._replace(smoothing=models.smoothing._replace(unsettled=unsettled))
+        simulation._sweep.models = models._replace(
+            smoothing=models.smoothing._replace(unsettled=unsettled)
+        )
+        (density,) = (one for one in simulation.scene.passes if one.stage == "density")
         solved = simulation.particles.support.copy()  # the start's are
         for _ in range(20):  # nothing moves: a support that is found stays
-            simulation._density(models)
+            simulation._make(density)
         return np.max(np.abs(np.log(simulation.particles.support / solved)))
 
     assert farthest(UNSETTLED) < UNSETTLED

@@ -225,7 +225,10 @@ def test_spacings_are_supports_over_their_number_of_spacings():
         sound_speed=lambda density, p: p / density,
     )
     simulation = SimpleNamespace(
-        scene=SimpleNamespace(models=SimpleNamespace(support_ratio=2.5, eta=1.6), eos=eos),
+        scene=SimpleNamespace(
+            formulation=SimpleNamespace(models=SimpleNamespace(support_ratio=2.5, eta=1.6)),
+            eos=eos,
+        ),
         particles=SimpleNamespace(
             mass=np.ones(3), density=np.array([1.0, 1.0, -1.0]), internal_energy=np.ones(3),
             support=np.array([1.0, 0.5, 1e-30]), velocity=np.zeros((1, 3)),

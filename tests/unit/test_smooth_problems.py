@@ -259,9 +259,9 @@ def test_report_of_gresho_finds_no_error_and_sees_one(bulk):
 
 
 def test_vortices_refuse_a_box_that_cuts_them():
-    with pytest.raises(ValidationError, match="to hold the vortex"):
+    with pytest.raises(ValidationError, match=r"expected at least 0\.8 "):
         Gresho(domain=[0.0, 0.7])
-    with pytest.raises(ValidationError, match="to hold the vortex"):
+    with pytest.raises(ValidationError, match="expected at least 10 "):
         Yee(domain=[[-5.0, 5.0], [-4.0, 4.0]])
     assert Gresho(domain=[0.0, 1.0]).initial(AIR).mass.size == 4096
     with pytest.raises(ValidationError):

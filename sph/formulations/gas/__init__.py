@@ -79,7 +79,6 @@ class Gas(Formulation):
         self.density_passes = physics.density_passes
         self.density = physics.density
         self.exchanges = terms.get("exchange") is not None
-        self.evolves_alpha = not terms["viscosity"].finds_shocks
         self.bounds_acceleration = (
             physics.density == "number"
         )  # the signal speed does not contain unequal masses

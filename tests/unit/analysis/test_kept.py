@@ -7,6 +7,7 @@ import pytest
 
 from sph.analysis.summary import baseline, conservation
 from sph.eos.ideal_gas import IdealGas
+from sph.totals import Baseline
 
 EOS = IdealGas(1.4)
 
@@ -30,15 +31,13 @@ def state(velocity=((3.0, 5.0), (0.0, 0.0)), mass=(1.0, 1.0)):
     """Two particles of density 1.4 and sound speed 2 (P = 4)."""
     n = len(mass)
     density = np.full(n, 1.4)
-    return SimpleNamespace(
-        velocity=np.array(velocity), mass=np.array(mass), density=density,
-        pressure_by=lambda eos: np.full(n, 4.0),
-    )  # fmt: skip
+    return SimpleNamespace(velocity=np.array(velocity), mass=np.array(mass), density=density)
 
 
 def kept(particles=None, keeps=(1.0, 1.0), **columns):
-    scene = SimpleNamespace(eos=EOS, keeps_momentum=np.array(keeps))
-    return conservation(history(**columns), particles or state(), scene)
+    formulation = SimpleNamespace(pressure=lambda state: np.full(state.mass.size, 4.0))
+    scene = SimpleNamespace(eos=EOS, keeps_momentum=np.array(keeps), formulation=formulation)
+    return conservation(history(**columns), particles or state(), scene, Baseline(1.0, 8.0))
 
 
 def test_energy_drift_is_the_last_and_the_largest_of_the_history():
@@ -51,7 +50,7 @@ def test_energy_drift_keeps_its_sign():
     assert kept(energy_drift=[0.0, 0.02, -0.05, -0.01])["energy_drift"] == -0.01
 
 
-def test_injected_energy_is_the_last_over_what_there_was():
+def test_injected_energy_is_the_last_over_the_scale_of_the_baseline():
     assert kept()["energy_injected"] == 0.4 / 8.0
 
 

@@ -101,12 +101,14 @@ def of_run(monkeypatch):
             problem=SimpleNamespace(name="uniform"), report=SimpleNamespace(reference=reference),
             time=SimpleNamespace(end=9.0),
         )  # fmt: skip
-        particles = SimpleNamespace(number=3, position=None, pressure_by=lambda eos: None)
+        particles = SimpleNamespace(number=3, position=None)
+        formulation = SimpleNamespace(pressure=lambda state: None)
         simulation = SimpleNamespace(
             scene=SimpleNamespace(
-                config=config, dimension=2, eos=None, parts=lambda: (["i"], ["o"])
+                config=config, dimension=2, formulation=formulation,
+                described=lambda: (["i"], ["o"]),
             ),
-            particles=particles, time=0.25, step=20,
+            particles=particles, time=0.25, step=20, baseline=None,
             nearest=lambda: np.array([0.9, 1.1, 0.2]),
         )  # fmt: skip
         return summary.of_run(simulation, {}, status, "a reason", lineage)

@@ -6,8 +6,9 @@ import pytest
 
 from sph import config, registry
 from sph.errors import ConfigError, FileError
-from sph.parts.viscosity import constant
+from sph.parts.viscosity import Viscosity, constant
 from sph.parts.viscosity.switches import cullen_dehnen, morris_monaghan
+from sph.scene import Scene
 
 KERNELS = ", ".join(f'"{name}"' for name in registry.names("sph.kernels"))
 MINIMAL = '[problem]\nname = "shock_tube"\n'
@@ -106,27 +107,33 @@ def test_whole_numbers_become_the_floats_that_are_meant():
     assert {type(value) for value in values} == {float}
 
 
+def viscosity_of(*overrides):
+    """The model of alpha in the scene with these overrides."""
+    (found,) = (p.coefficient for p in Scene(default(*overrides)).parts if type(p) is Viscosity)
+    return found
+
+
 def test_models():
-    physics = default("physics.gamma=2", "physics.alpha=2").physics
+    physics = default("physics.gamma=2").physics
     assert type(physics.kernel_model()) is registry.model_class("sph.kernels", "wendland_c2")
     assert physics.eos_model() == registry.model_class("sph.eos", "ideal_gas")(2.0)
-    assert type(physics.viscosity_model()) is constant.ConstantAlpha
-    assert type(physics.viscosity_model().alpha) is float
+    viscosity = viscosity_of("physics.alpha=2")
+    assert type(viscosity) is constant.ConstantAlpha
+    assert type(viscosity.alpha) is float
 
 
 def test_models_of_tables():
     physics = default(
-        "physics.alpha={min = 0, max = 2}",
         "physics.kernel={name = 'cubic_spline', flattened = true}",
         "physics.eos={name = 'ideal_gas', gamma = 3}",
     ).physics
-    viscosity = physics.viscosity_model()
+    viscosity = viscosity_of("physics.alpha={min = 0, max = 2}")
     assert type(viscosity) is morris_monaghan.MorrisMonaghan
     assert (type(viscosity.min), type(viscosity.max)) == (float, float)
     assert viscosity == (0.0, 2.0)
-    other = default("physics.alpha={min = 0, max = 2, switch = 'cullen_dehnen'}").physics
-    assert type(other.viscosity_model()) is cullen_dehnen.CullenDehnen
-    assert other.viscosity_model() == (0.0, 2.0, 0.05)
+    other = viscosity_of("physics.alpha={min = 0, max = 2, switch = 'cullen_dehnen'}")
+    assert type(other) is cullen_dehnen.CullenDehnen
+    assert other == (0.0, 2.0, 0.05)
     assert physics.kernel_model().flattened is True
     assert physics.eos_model() == (3.0,)
     assert type(physics.eos_model().gamma) is float

@@ -4,7 +4,7 @@ import pytest
 
 from sph import config as configuration
 from sph import registry
-from sph.config import restarts
+from sph.config import physics, restarts
 from sph.config.sections import SECTIONS
 
 START = """
@@ -22,6 +22,9 @@ interval = 0.05
 """
 HEATING = 'physics.heating={ name = "relaxation", energy = 1.0, time = 0.1 }'
 RANGE = "physics.alpha={ min = 0.1, max = 2.0 }"
+
+PHYSICS = {name: physics.table(name) for name in registry.names(physics.FORMULATIONS, folders=True)}
+TABLES = {"physics": PHYSICS[physics.DEFAULT], **SECTIONS}
 
 # a changed value of every key beside [problem], by what a restart does with it
 FREE = ["time.end=0.3", "output.interval=0.1", "report.reference=fine", "run.threads=2",
@@ -41,17 +44,19 @@ def changes(overrides, start=()):
     return restarts.changes(before, before.override(overrides))
 
 
-@pytest.mark.parametrize("name", [*SECTIONS, *registry.names("sph.problems")])
+@pytest.mark.parametrize("name", [*SECTIONS, *PHYSICS, *registry.names("sph.problems")])
 def test_every_key_has_a_class(name):
-    section = SECTIONS.get(name) or registry.load("sph.problems", name).Problem
+    section = (SECTIONS | PHYSICS).get(name) or registry.load("sph.problems", name).Problem
     for key in section.model_fields:
         assert restarts.class_of(section, key) in restarts.CLASSES, key
 
 
 def test_every_key_is_tried_below():
     tried = {override.partition("=")[0] for override in FREE + RECORDED + REFUSED}
-    keys = {f"{name}.{key}" for name, table in SECTIONS.items() for key in table.model_fields}
-    assert keys <= tried
+    keys = {f"{name}.{key}" for name, table in TABLES.items() for key in table.model_fields}
+    assert len(PHYSICS) == 1  # so there is no other value to try of the key that names it
+    assert keys - {"physics.formulation"} <= tried
+    assert restarts.class_of(TABLES["physics"], "formulation") == "refused"
 
 
 @pytest.mark.parametrize("override", FREE)

@@ -2,12 +2,18 @@
 
 import pytest
 
-from sph import config, eos
+from sph import config, eos, registry
+from sph.config.physics import model_folders
 from sph.errors import ConfigError
+from sph.parts.external import External
+from sph.scene import Scene
 
 LIQUID = """
 from typing import NamedTuple
+from sph.eos import Defaults
+from sph.model import model
 
+@model(Defaults)
 class LiquidOfATest(NamedTuple):
     stiffness: float
 
@@ -20,6 +26,21 @@ def physics(scheme, gas):
     return config.from_text(
         f'[problem]\nname = "uniform"\n[physics]\nscheme = "{scheme}"\n{gas}\n', "a test"
     ).physics
+
+
+@pytest.mark.parametrize("folder", ["sph.kernels", "sph.eos", *model_folders()])
+def test_every_file_in_a_folder_of_models_is_a_model(folder):
+    for name in registry.names(folder):
+        assert registry.model_class(folder, name).name == name
+
+
+def test_a_model_without_the_base_of_its_folder_is_an_error_that_says_so(tmp_path, monkeypatch):
+    (tmp_path / "plain.py").write_text(
+        LIQUID.replace("@model(Defaults)", "").replace("Liquid", "P")
+    )
+    monkeypatch.setattr(eos, "__path__", [*eos.__path__, str(tmp_path)])
+    with pytest.raises(TypeError, match=r"sph\.eos\.plain: decorate POfATest with @model\(Base\)"):
+        physics("grad_h", 'eos = { name = "plain", stiffness = 2.0 }')
 
 
 def test_pressure_energy_takes_an_ideal_gas_alone(tmp_path, monkeypatch):
@@ -82,7 +103,8 @@ MASS = 'external = { name = "point_mass", mass = 1.0 }'
 def test_a_point_mass_has_no_place_in_a_periodic_box(boundary, is_wrong):
     text = f'[problem]\nname = "uniform"\nboundary = {boundary}\n[physics]\n{MASS}\n'
     if not is_wrong:
-        assert config.from_text(text).physics.external_model().mass == 1.0
+        (field,) = (p.field for p in Scene(config.from_text(text)).parts if isinstance(p, External))
+        assert field.mass == 1.0
         return
     with pytest.raises(ConfigError, match=r"line 5: physics.external = .* no periodic images") as e:
         config.from_text(text, "a")

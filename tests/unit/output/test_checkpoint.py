@@ -3,6 +3,7 @@ import contextlib
 import errno
 import fcntl
 import io
+import json
 import os
 import signal
 import subprocess
@@ -16,6 +17,8 @@ import pytest
 
 from sph.errors import FileError
 from sph.output import checkpoint, files, stored
+
+REFERENCE = Path(__file__).parents[2] / "reference"
 
 
 @pytest.fixture
@@ -289,6 +292,12 @@ def linked(link):
     return change
 
 
+def listed(group, name, entry):
+    """Give the list of fields that entry for `name`; None takes it out."""
+    fields = json.loads(group.attrs["fields"]) | {name: entry}
+    group.attrs["fields"] = json.dumps({name: one for name, one in fields.items() if one})
+
+
 STRANGE = {
     "longer": (replaced("mass", data=np.ones(51)), "mass has the shape (51,), expected (50,)"),
     "half": (replaced("omega", data=np.ones(25)), "omega has the shape (25,)"),
@@ -303,10 +312,12 @@ STRANGE = {
     "negative": (replaced("step", data=-1), "step = -1"),
     "no step": (replaced("next_step", data=0.0), "next_step = 0.0"),
     "skin": (replaced("list_skin", data=1e9), "list_skin = 1000000000.0"),
+    "injected": (replaced("energy_injected", data=np.nan), "energy_injected = nan"),
+    "baseline": (replaced("baseline_scale", data=np.inf), "baseline_scale = inf"),
     "IDs": (replaced("id", data=np.ones(50, int)), "IDs are not all positive"),
-    "nan": (replaced("velocity", data=np.full((2, 50), np.nan)), "velocity has non-finite"),
-    "support": (replaced("support", data=np.zeros(50)), "support has values that are not positive"),
-    "cold": (replaced("internal_energy", data=-np.ones(50)), "internal_energy has negative"),
+    "nan": (replaced("velocity", data=np.full((2, 50), np.nan)), "velocity is not finite"),
+    "support": (replaced("support", data=np.zeros(50)), "support is not above 0"),
+    "cold": (replaced("internal_energy", data=-np.ones(50)), "internal_energy is below 0"),
     "away": (replaced("list_position", data=np.full((2, 50), 9.0)), "list_position is outside"),
     "far": (replaced("position", data=np.full((2, 50), 1e200)), "position is outside the domain"),
     "3-D": (replaced("position", data=np.zeros((3, 50))), "position has the shape (3, 50)"),
@@ -323,7 +334,10 @@ STRANGE = {
     "soft": (linked(h5py.SoftLink("/PartType0/Masses")), "mass is a link"),
     "more": (lambda group: group.create_dataset("more", data=1.0), "not hold the datasets"),
     "less": (lambda group: group.pop("mass"), "mass missing"),
-    "alpha": (lambda group: group.create_dataset("alpha", data=np.ones(50)), "alpha is present"),
+    "unlisted": (lambda group: (group.pop("mass"), listed(group, "mass", None)),
+                 "mass is missing, which contradicts"),
+    "alpha": (lambda group: (group.create_dataset("alpha", data=np.ones(50)),
+                             listed(group, "alpha", [0, False])), "alpha is present"),
     "format": (lambda group: group.attrs.update(format_version=[1, 2]), "format_version"),
     "lineage": (lambda group: group.attrs.update(lineage="{}"), "lineage"),
     "text array": (lambda group: group.attrs.update(configuration=["a"] * 9), "configuration"),
@@ -345,6 +359,21 @@ def test_a_strange_file_is_refused_before_anything_is_made_of_it(written, what, 
             group.attrs["sha256"] = checkpoint.state_hash(state)
     seal(written)
     refused(written, words)
+
+
+def test_a_field_has_the_rank_that_its_part_declares(tmp_path, make_state):
+    """Of those that every scene has, the rank is checked before they are read."""
+    path = tmp_path / "a.h5"
+    checkpoint.write(path, make_state(alpha=0.1))
+    with h5py.File(path, "r+") as file:
+        group = file["Checkpoint"]
+        replaced("alpha", data=np.ones((2, 50)))(group)
+        listed(group, "alpha", [1, False])
+        group.attrs["sha256"] = checkpoint.state_hash(
+            {name: one[()] for name, one in group.items()}
+        )
+    seal(path)
+    refused(path, "alpha has the shape (2, 50), expected (50,)")
 
 
 @pytest.mark.parametrize(
@@ -383,6 +412,70 @@ def test_fields_written_are_those_of_the_scene(tmp_path, make_state):
     assert named == {name: (one.rank, one.remade) for name, one in fields.items()}
 
 
+HOSTILE = {
+    "no JSON": "{",
+    "deep": "[" * 100_000,
+    "a number": "3",
+    "a list": '[["mass", 0, false]]',
+    "a text": '"mass"',
+    "null": "null",
+    "a rank alone": '{"mass": 0}',
+    "no rank": '{"mass": []}',
+    "three entries": '{"mass": [0, false, 1]}',
+    "a text for a rank": '{"mass": ["many", false]}',
+    "infinite": '{"mass": [Infinity, false]}',
+    "NaN": '{"mass": [NaN, false]}',
+    "rank 7": '{"mass": [7, false]}',
+    "rank 3": '{"mass": [3, false]}',
+    "rank -1": '{"mass": [-1, false]}',
+    "slash": '{"mass": [0, false], "../PartType0/Masses": [0, false]}',
+    "inner slash": '{"a/b": [0, false]}',
+    "root": '{"/": [0, false]}',
+    "dot": '{".": [0, false]}',
+    "empty name": '{"": [0, false]}',
+    "NUL": '{"a\\u0000b": [0, false]}',
+    "line": '{"mass\\n": [0, false]}',
+    "surrogate": '{"\\udcff": [0, false]}',
+    "attribute": '{"__class__": [0, false]}',
+    "long": json.dumps({"a" * 62: [0, False]}),
+    "a number of the run": '{"time": [0, false]}',
+    "a list of the search": '{"list_support": [0, false]}',
+    "an energy": '{"energy_added": [0, false]}',
+}
+
+
+@pytest.mark.parametrize("what", HOSTILE)
+def test_a_hostile_list_of_fields_is_refused(what):
+    with pytest.raises(stored.Refused, match="its list of fields") as caught:
+        stored.fields_of(HOSTILE[what])
+    assert caught.value.kind == "foreign"
+    assert str(caught.value).isprintable()
+
+
+def test_a_list_of_fields_is_read():
+    assert stored.fields_of('{"mass": [0, false], "a_b2": [2, true]}') == {
+        "mass": (0, False),
+        "a_b2": (2, True),
+    }
+
+
+@pytest.mark.parametrize(
+    ("named", "words"),
+    [
+        ({"mass": [1, False]}, "the field mass is of rank 1"),
+        ({"velocity": [7, False]}, "wrong name or rank: 'velocity'"),
+        ({"more": [0, False]}, "more missing"),
+        ({"more/less": [0, False]}, "wrong name or rank: 'more/less'"),
+    ],
+)
+def test_a_file_with_a_wrong_list_of_fields_is_refused(written, named, words):
+    with h5py.File(written, "r+") as file:
+        attributes = file["Checkpoint"].attrs
+        attributes["fields"] = json.dumps(json.loads(attributes["fields"]) | named)
+    seal(written)
+    refused(written, words)
+
+
 @pytest.mark.parametrize(("version", "word"), [(0, "an older"), (1000, "a newer")])
 def test_other_formats(written, version, word):
     with h5py.File(written, "r+") as file:
@@ -410,7 +503,7 @@ def in_another_process(path, preparation):
     """Write a larger state to `path` in a process of its own, after `preparation`."""
     program = f"""
         import os, resource, signal, sys
-        sys.path.insert(0, {str(Path(__file__).parent)!r})
+        sys.path[:0] = {[str(Path(__file__).parent), str(REFERENCE)]!r}
         from conftest import random_state
         from sph.errors import FileError
         from sph.output import checkpoint, files, layout
