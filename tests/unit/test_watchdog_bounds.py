@@ -127,7 +127,8 @@ def test_what_a_run_begins_with_is_not_cured_by_smaller_steps():
 
 @pytest.mark.parametrize(("above", "is_torn"), [(1e-9, False), (0.0, True), (-1e-9, True)])
 def test_gas_is_torn_where_sound_has_no_speed(above, is_torn):
-    liquid = '[problem]\nname = "uniform"\n[physics.eos]\nname = "stiffened_gas"\ngamma = 4.4\np_inf = 1.0\n'
+    liquid = '[problem]\nname = "uniform"\n[physics]\n'
+    liquid += 'eos = { name = "stiffened_gas", gamma = 4.4, p_inf = 1.0 }\n'
     gas = Scene(configuration.from_text(liquid)).formulation
     gas.eos = SimpleNamespace(lowest_energy=lambda density: 0.25 * density)
     state = quiet(density=np.array([1.0, 1.0, 2.0, 1.0]))
