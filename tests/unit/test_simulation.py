@@ -9,6 +9,7 @@ from sph import config as configuration
 from sph.errors import NumericalError
 from sph.output.checkpoint import state_hash
 from sph.part import Rule
+from sph.state import State
 from sph.threads import SMALLEST_RANGE, Team
 
 TUBE = """
@@ -95,6 +96,58 @@ def test_two_threads_give_the_bits_of_one(begin, monkeypatch, switch):
         two.advance(0.02)
         assert fingerprint(one) == fingerprint(two)
     assert one.list_builds > builds  # with new lists on the way
+
+
+# --- new orders -------------------------------------------------------------------------------
+
+BOX = """
+[problem]
+name = "uniform"
+dimension = 2
+n = 100
+noise = 0.3
+velocity = [3.0, 2.0]
+boundary = "mirror"
+[time]
+end = 1.0
+[output]
+interval = 1.0
+"""
+
+
+@pytest.mark.parametrize(
+    "overrides",
+    [
+        [],
+        ["physics.alpha={ min = 0.1, max = 2.0 }"],
+        ["physics.alpha={ min = 0.1, max = 2.0, switch = 'cullen_dehnen' }",
+         "physics.conductivity={ name = 'pressure_jump', switched = true }"],
+        ["physics.scheme=pressure_energy", "physics.conductivity=approach"],
+        ["physics.balsara=false", "physics.density=number",
+         "physics.external={ name = 'point_mass', mass = 0.1, softening = 0.5 }",
+         "physics.heating={ name = 'relaxation', energy = 1.0, time = 0.1 }"],
+    ],
+    ids=["plain", "rate of alpha", "shocks and contacts", "sum of the pressure", "sources"],
+)  # fmt: skip
+def test_what_a_new_order_does_not_carry_along_is_written_before_it_is_read(
+    begin, monkeypatch, overrides
+):
+    plain, shuffled = begin(BOX, *overrides), begin(BOX, *overrides)
+    reorder = State.reorder
+
+    def forget(state, order, names):
+        reorder(state, order, names)
+        if state is shuffled.particles:
+            for field in state.fields:
+                if field.name not in names:
+                    getattr(state, field.name)[:] = np.nan
+
+    monkeypatch.setattr(State, "reorder", forget)
+    for simulation in (plain, shuffled):
+        builds = simulation.list_builds
+        while simulation.list_builds < builds + 2:
+            simulation.advance(1.0)
+    assert fingerprint(plain) == fingerprint(shuffled)
 
 
 # --- where a step ends ------------------------------------------------------------------------
