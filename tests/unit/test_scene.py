@@ -64,6 +64,29 @@ def test_a_property_holds_where_something_asks_for_it(holds, there, absent):
     assert [holds(scene(*overrides)) for overrides in absent] == [False] * len(absent)
 
 
+EVERY = {
+    "id", "mass", "position", "velocity", "internal_energy", "support", "density", "acceleration",
+    "energy_rate", "omega",
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("overrides", "stored"),
+    [
+        ([], set()),
+        ([RANGE], {"alpha", "alpha_rate"}),
+        ([SHOCKS], {"alpha"}),
+        (["physics.scheme=pressure_energy"], {"pressure"}),
+        ([CONTACTS], set()),
+        ([FIELD, HEATING, STILL], set()),
+    ],
+)
+def test_a_checkpoint_stores_what_a_step_begins_with_and_no_work_arrays(overrides, stored):
+    fields = scene(*overrides).fields
+    assert {field.name for field in fields if field.stored} == EVERY | stored
+    assert len({field.name for field in fields}) == len(fields)  # each has one owner
+
+
 def test_gas_that_does_not_fill_its_box_has_no_volume_to_be():
     closed = configuration.from_text('[problem]\nname = "noh"\nn = 50\n')
     assert set(closed.problem.boundaries) == {"mirror"}
