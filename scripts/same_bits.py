@@ -135,8 +135,13 @@ SCENES = {
 }  # fmt: skip
 
 # Differences from an older tree that a change of the numerics has made on purpose, by scene.
+ONCE = "the pressure that pressure_jump compares is computed once a particle: other rounding"
 EXPLAINED = {
     "tube, alpha 16": "C is held where the leapfrog is stable with that alpha (since 15dd102)",
+    "tube, conductivity everywhere": ONCE,
+    "shocks": ONCE,
+    "cloud, open": ONCE,
+    "contrast, all parts": ONCE,
 }
 
 
@@ -147,12 +152,11 @@ class Enough(Exception):
 class Follow:
     """Progress of a run that keeps what the last step left, and ends or interrupts the run."""
 
-    def __init__(self, stop_at: int | None = None):
-        self.stop_at, self.found = stop_at, None
+    def __init__(self, end: float, stop_at: int | None):
+        self.end, self.stop_at, self.found = end, stop_at, None
 
     def step(self, simulation):
-        config = simulation.scene.config
-        if simulation.step >= STEPS or simulation.time >= config.time.end:
+        if simulation.step >= STEPS or simulation.time >= self.end:
             self.found = fingerprint(simulation)
             raise Enough
         if simulation.step == self.stop_at:
@@ -222,13 +226,13 @@ def followed(text: str, overrides: list[str], stop_at: int | None) -> dict:
     from sph.errors import SphError, Stopped
     from sph.output.run_directory import RunDirectory
 
-    follow = Follow(stop_at)
     with tempfile.TemporaryDirectory() as home:
         try:
             config = configuration.from_text(text, "the scene")
             # no output but at the end: landing on one cuts a step
             fixed = [f"output.interval={config.time.end!r}", "physics.max_energy_drift=0.02"]
             config = config.override(["run.threads=1", *fixed, *overrides])
+            follow = Follow(config.time.end, stop_at)
             directory = RunDirectory.create(Path(home) / "run")
             try:
                 runner.run(config, directory, follow)

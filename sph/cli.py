@@ -177,17 +177,34 @@ def list_choices():
     from sph import registry
     from sph.stress.case import load as stress_cases
 
-    for package in (
-        "problems", "kernels", "schemes", "eos", "viscosity.switches", "conductivity", "external",
-        "heating",
-    ):  # fmt: skip
-        click.echo(f"{package}:")
-        for name in registry.names(f"sph.{package}"):
-            module = registry.load(f"sph.{package}", name)
+    for title, package in _choices().items():
+        click.echo(f"{title}:")
+        folders = package in FOLDERS
+        for name in registry.names(package, folders):
+            module = registry.load(package, name, folders)
             click.echo(f"  {name:24s} {docstring(module).strip().splitlines()[0]}")
     click.echo("stress cases:")
     for case in stress_cases():
         click.echo(f"  {case.name:24s} {case.title}")
+
+
+# Whose choices are folders, not files.
+FOLDERS = ("sph.formulations", "sph.parts")
+
+
+def _choices() -> dict[str, str]:
+    """Return the folders whose files or folders a configuration can name, by title."""
+    from sph import registry
+    from sph.config import physics
+
+    found = {
+        "problems": "sph.problems", "kernels": "sph.kernels", "equations of state": "sph.eos",
+        **{package.removeprefix("sph."): package for package in FOLDERS},
+    }  # fmt: skip
+    for name in registry.names("sph.formulations", folders=True):
+        for kind in physics.table(name).kinds:
+            found |= {f"physics.{key.name}": key.models for key in kind.keys if key.models}
+    return found
 
 
 def _print_result(result, target, strict):

@@ -225,7 +225,7 @@ class Entries(caching._Cache):
         if directory().descriptor is None:
             directory().warn()
         # if sources were edited after the start, this code does not belong in the directory
-        elif fingerprint.sources() == fingerprint.facts()["sources of sph"]:
+        elif fingerprint.are_sources_unchanged():
             key = self._whole_key(sig, data.codegen)
             directory().write(self._name(key), dumps((key, data._reduce())))
 

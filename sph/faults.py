@@ -1,47 +1,48 @@
-"""Errors of a simulation that cannot go on: what broke and when, which particle, what to try."""
+"""Errors that stop a simulation: what failed, when, at which particle, and what to try."""
 
 import numpy as np
 
 from sph.errors import NumericalError
 from sph.neighbours.order import BLOCK
 
-# Squares and cubes of what a run begins with, their sums and inverses have to be numbers too.
+# Squares and cubes of initial values, their sums and inverses must not overflow float64.
 LARGEST = 1e100
 NEARER_UNITS = (
-    f"code units in which it is nearer to 1: outside {1.0 / LARGEST:g} to {LARGEST:g} its square "
-    "and cube are no numbers any more"
+    f"other code units: expected values from {1.0 / LARGEST:g} to {LARGEST:g}, whose squares and "
+    "cubes float64 can hold"
 )
 
-TINY_C = 1e-3  # below it steps are short because they are meant to be
+TINY_C = 1e-3  # for smaller physics.C, short steps are intended
 
 SETS = {
-    "signal_speed": "the speed of its signals",
-    "energy": "u/|du/dt|, how fast it is heated or cooled",
-    "acceleration": "its acceleration",
-    "support": "how fast its support changes",
-    "approach": "its approach to gas that is not its neighbour yet",
+    "signal_speed": "signal speed",
+    "energy": "u/|du/dt|, the rate of change of internal energy",
+    "acceleration": "acceleration",
+    "support": "rate of change of the support radius",
+    "approach": "approach to a particle that is not a neighbour yet",
 }
 SETS_FOR_ALL = {
-    "growth": "it may not grow faster",
-    "end": "it is as long as the run",
-    "checkpoint": "it is that of the checkpoint",
-    "approach": "particles may not move against each other by more than the box is long",
+    "growth": "limited by the largest growth per step",
+    "end": "limited by the length of the run",
+    "checkpoint": "taken from the checkpoint",
+    "approach": "limited by relative motions of the length of the box",
 }
 
 
 def fault(simulation, what: str, remedy: str, particle: int) -> NumericalError:
-    """The error to raise: what broke and when, what to try, and the ID of a particle (0: none)."""
+    """Return the error to raise. what: the failure; remedy: what to try; particle: ID, or 0."""
     return NumericalError(
         f"step {simulation.step}, t = {simulation.time:.6g}: {what}.\nTry: {remedy}.", particle
     )
 
 
 def what_sets(simulation) -> str:
-    """The particle and criterion of the coming step, in words."""
+    """Return a description of what limits the next step: criterion and particle."""
     limit = simulation.limit
     if not limit.particle:
         return SETS_FOR_ALL[limit.criterion]
-    return f"particle {limit.particle} sets it by {_criterion(simulation.scene, limit.criterion)}"
+    criterion = _criterion(simulation.scene, limit.criterion)
+    return f"limited by particle {limit.particle} ({criterion})"
 
 
 def _criterion(scene, criterion: str) -> str:
@@ -51,7 +52,7 @@ def _criterion(scene, criterion: str) -> str:
 
 
 def _holds(scene) -> str:
-    """What holds the Courant number below physics.C, in words."""
+    """Return what reduces the Courant number below physics.C, as text."""
     by = scene.step_bounds.criterion
     words = (part.held_words(by) for part in scene.all_parts)
     return next(filter(None, words), "the stability of the leapfrog")
@@ -62,13 +63,13 @@ def _remedies(scene, trouble: str, held_by: str) -> list[str]:
 
 
 def smaller_steps(simulation) -> str:
-    """What to try where steps were too long, of what can help with this run's settings."""
+    """Return what to try if steps were too long, given the settings of this run."""
     scene = simulation.scene
     bounds = scene.step_bounds
     remedies = ["a smaller physics.C"]
     if bounds.courant < scene.physics.C:
         remedies = [
-            f"a physics.C below {bounds.courant:.3g}, at which {_holds(scene)} holds it already"
+            f"a physics.C below {bounds.courant:.3g}, to which {_holds(scene)} already reduces it"
         ]
     remedies += _remedies(scene, "long steps", bounds.criterion)
     if not bounds.energy:
@@ -77,18 +78,20 @@ def smaller_steps(simulation) -> str:
 
 
 def held_courant(scene) -> str | None:
-    """In words, that the run takes a smaller Courant number than physics.C; None if it does not."""
+    """Return a note that the run uses a smaller Courant number than physics.C, or None."""
     held, given = scene.step_bounds.courant, scene.physics.C
     return (
-        None if held == given else f"physics.C = {given:g} is held at {held:.3g} by {_holds(scene)}"
+        None
+        if held == given
+        else f"physics.C = {given:g} is reduced to {held:.3g} by {_holds(scene)}"
     )
 
 
 def longer_steps(simulation) -> str:
-    """What to try where steps have become too short to go on, by what sets the coming one."""
+    """Return what to try if steps have become too short, by the criterion of the next step."""
     scene, criterion = simulation.scene, simulation.limit.criterion
     if criterion == "energy":
-        return "physics.energy_limit = false, which leaves fast heating and cooling to eq 32"
+        return "physics.energy_limit = false, which removes the limit u/|du/dt|"
     by_part = _remedies(scene, "short steps", criterion)
     if criterion == "acceleration" and by_part:
         return by_part[0]
@@ -100,18 +103,20 @@ def longer_steps(simulation) -> str:
 
 
 def drift_remedy(simulation) -> str:
-    """What to try where total energy has drifted too far."""
+    """Return what to try if energy drift is too large."""
     remedies = [smaller_steps(simulation), *_remedies(simulation.scene, "drift", "")]
-    return f"{', '.join(remedies)}, or a larger physics.max_energy_drift if that is good enough"
+    return (
+        f"{', '.join(remedies)}, or a larger physics.max_energy_drift if such a drift is acceptable"
+    )
 
 
 def of_numbers(simulation) -> str:
-    """What to try where values are not finite: the start took no step that could be too long."""
+    """Return what to try if values are not finite; smaller steps can help only after the start."""
     return smaller_steps(simulation) if simulation.step else NEARER_UNITS
 
 
 def fault_of(simulation, name: str, values, bad, remedy: str) -> NumericalError:
-    """The error of the first particle whose `values` are `bad`, arrays (N,) or (D, N)."""
+    """Return the error of the first particle with `bad` values, arrays (N,) or (D, N)."""
     p = simulation.particles
     i = int(np.argwhere(bad)[0][-1])
     count = int(bad.any(axis=tuple(range(bad.ndim - 1))).sum())
@@ -127,10 +132,10 @@ def fault_of(simulation, name: str, values, bad, remedy: str) -> NumericalError:
 def endless_sum(simulation) -> NumericalError:
     """The error to raise where every particle's value is finite, but not their sum."""
     p, totals = simulation.particles, simulation.totals
-    with np.errstate(all="ignore"):  # the very numbers that are looked for
-        name, each, remedy = _endless_energy(simulation) or (None, None, of_numbers(simulation))
-        if name is not None:
-            pass
+    with np.errstate(all="ignore"):  # overflow is what is searched for
+        remedy = of_numbers(simulation)
+        if found := _endless_energy(simulation):
+            name, each, remedy = found
         elif not np.isfinite(totals.kinetic_energy):
             name, each = "kinetic energy", (p.velocity**2).sum(axis=0)
         elif not np.isfinite(totals.internal_energy):
@@ -159,18 +164,18 @@ def _endless_energy(simulation) -> tuple[str, np.ndarray, str] | None:
 
 
 def starved(simulation, block: int) -> NumericalError:
-    """The error to raise where particles of a block ask for wider supports without an end."""
+    """Return the error for a block whose support radii grow without limit."""
     among = simulation.particles.id[block * BLOCK : (block + 1) * BLOCK].tolist()
     return fault(
         simulation,
-        f"no support holds enough neighbours for a particle among {among}",
+        f"no support radius contains enough neighbours for one of the particles {among}",
         "a closed domain (problem.boundary), or more particles",
         among[0],
     )
 
 
 def crowded(simulation) -> NumericalError:
-    """The error to raise where a density below zero says that a particle has no support."""
+    """Return the error for a particle without a support radius, marked by a density below 0."""
     p = simulation.particles
     i = int(np.argmin(p.density))
     here = p.position[:, i]
@@ -178,20 +183,20 @@ def crowded(simulation) -> NumericalError:
     there = (s[:, None] * p.position + o[:, None] == here[:, None] for s, o in images)
     others = sum(int(same.all(axis=0).sum()) for same in there) - 1
     because = (
-        f"{others} other(s) in the same place, images at walls among them, outweigh"
+        f"{others} other particle(s) or images at the same position have"
         if others
-        else "alone it outweighs"
+        else "the particle alone has"
     )
     return fault(
         simulation,
-        f"there is no support small enough for particle {p.id[i]} at {_place(p, i)}: "
-        f"{because} what it is to hold",
-        "a larger physics.eta, particles apart from each other, or physics.density = "
-        '"number" where one is much heavier than its neighbour',
+        f"no support radius is small enough for particle {p.id[i]} at {_place(p, i)}: "
+        f"{because} more mass than the support should contain",
+        "a larger physics.eta, positions that do not coincide, or, for very unequal masses, "
+        'physics.density = "number"',
         int(p.id[i]),
     )
 
 
 def _place(particles, i: int) -> str:
-    """Where that particle is, in words."""
+    """Return the position of particle i as text."""
     return f"({', '.join(f'{x:.6g}' for x in particles.position[:, i])})"

@@ -19,6 +19,7 @@ import numpy as np
 from llvmlite import binding
 
 import sph
+from sph import registry
 
 # Settings of Numba that do not change compiled code: debugging output, paths, CUDA, the number of
 # threads (for parallel=True, which sph does not use). All others count, including those that a
@@ -34,7 +35,22 @@ _NUMPY_SETTINGS = ("NPY_DISABLE_CPU_FEATURES", "NPY_ENABLE_CPU_FEATURES")
 
 def sources() -> str:
     """Return a hash of all source files of the package, 16 digits; "" if there are none."""
-    root = Path(sph.__file__).parent
+    return _hash_of_sources(Path(sph.__file__).parent)
+
+
+def extensions() -> dict[str, str]:
+    """Return the hash of the source files in `sph_extensions`, if there are any."""
+    hashes = [_hash_of_sources(Path(folder)) for folder in registry.extension_folders()]
+    return {"sources of sph_extensions": " ".join(hashes)} if any(hashes) else {}
+
+
+def are_sources_unchanged() -> bool:
+    """Return whether the source files are those of the first call of `facts`."""
+    now = {"sources of sph": sources(), **extensions()}
+    return all(facts().get(name) == value for name, value in now.items())
+
+
+def _hash_of_sources(root: Path) -> str:
     digest, files = hashlib.sha256(), sorted(root.rglob("*.py"))
     for path in files:
         digest.update(str(path.relative_to(root)).encode())
@@ -48,6 +64,7 @@ def facts() -> dict[str, str]:
     features = binding.get_host_cpu_features()
     return {
         "sources of sph": sources(),
+        **extensions(),
         "Python": platform.python_version(),
         "NumPy": np.__version__,
         "Numba": numba.__version__,
@@ -111,7 +128,7 @@ def differences(then: str | None) -> str | None:
 def _change(name: str, before, now) -> str:
     """Return a fact that differs, with both values if they are short."""
     shown = ["not set" if value is None else ascii(value).strip("'") for value in (before, now)]
-    if name == "sources of sph" or max(map(len, shown)) > 40:
+    if name.startswith("sources of") or max(map(len, shown)) > 40:
         return ascii(name).strip("'")
     return "{} ({}, here {})".format(ascii(name).strip("'"), *shown)
 

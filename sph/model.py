@@ -1,10 +1,10 @@
-"""Models: named tuples of parameters whose methods are formulas (kernels, equations of state, …)."""
+"""Models: named tuples of parameters whose methods are formulas, such as kernels."""
 
 from typing import Annotated, Any, NamedTuple, get_args, get_origin, get_type_hints
 
 
 class Parameter(NamedTuple):
-    """Annotates a model's parameter with its help text and its bounds.
+    """Annotation of a model's parameter: its help text and bounds.
 
     strength: Annotated[float, Parameter("1 is the value of the paper", at_least=0.0)] = 1.0
     """
@@ -15,20 +15,20 @@ class Parameter(NamedTuple):
 
 
 class Model:
-    """The base of all models. Folders of models extend it by what theirs may leave out.
+    """Base of all models. Packages of models extend it with defaults for theirs.
 
-    A NamedTuple cannot inherit, so `@model(Base)` copies what its class does not define.
+    A NamedTuple cannot inherit, so `@model(Base)` copies what the class does not define.
     """
 
     name = ""  # of the file, as in the configuration
 
     def issues(self) -> list[tuple[str, str]]:
-        """(parameter, what is wrong) of parameters that are valid each by itself."""
+        """Return (parameter, message) for values that are valid by themselves but not together."""
         return []
 
 
 def model(base: type):
-    """Decorate a NamedTuple as a model: it takes defaults from `base`, and its file's name."""
+    """Return a decorator that makes a NamedTuple a model, with defaults from `base`."""
 
     def finish(kind):
         for one in base.__mro__[:-1]:
@@ -41,8 +41,8 @@ def model(base: type):
     return finish
 
 
-def parameters(kind: type) -> dict[str, tuple[Any, Parameter]]:
-    """Type and declaration of each parameter of a model's class."""
+def parameters(kind: Any) -> dict[str, tuple[Any, Parameter]]:
+    """Return type and declaration of each parameter of a model's class."""
     hints = get_type_hints(kind, include_extras=True)
     return {key: _declared(key, hints[key]) for key in kind._fields}
 

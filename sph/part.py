@@ -1,9 +1,9 @@
-"""The protocol of a part: a piece of physics with its state, passes, bounds, sums and keys.
+"""The protocol of a part: a piece of physics with its fields, passes, limits, sums and keys.
 
-A formulation (`sph.formulations`) is the part that every scene has one of; optional physics are the
-folders of `sph.parts`. Each hook below has a default that does nothing, so a part defines what it
-has and nothing else. The simulation, checkpoints, history, errors and the configuration follow what
-is declared here and know no physics.
+Every scene has one formulation (`sph.formulations`), which is a part, and optional parts, the
+folders of `sph.parts`. Each method below has a default that does nothing, so a part defines only
+what it needs. The simulation, checkpoints, history, errors and configuration use these declarations
+and contain no physics.
 """
 
 from collections.abc import Callable, Mapping
@@ -39,11 +39,11 @@ class Key(NamedTuple):
 
 
 class Rule(NamedTuple):
-    """How a quantity moves in time, in place, on arrays of any one rank.
+    """Time integration of a quantity, in place, for arrays of equal shape.
 
-    predict(dt, value, rate, mass, predicted): half a step into value, a full step into predicted;
-    correct(dt, value, rate, mass): the second half with the new rate. Both return the energy that
-    the quantity was given beyond its rate, summed over particles.
+    predict(dt, value, rate, mass, predicted): half a step in value, a full step in predicted;
+    correct(dt, value, rate, mass): the second half step with the new rate. Both return the energy
+    added beyond the rate, summed over particles.
     """
 
     predict: Callable[..., float]
@@ -51,7 +51,7 @@ class Rule(NamedTuple):
 
 
 class Evolved(NamedTuple):
-    """A field that moves in time with a rate: names of fields, and its rule (`leapfrog`)."""
+    """A field that is integrated in time: names of its fields, and its rule (`leapfrog`)."""
 
     value: str
     rate: str
@@ -65,10 +65,10 @@ STAGES = ("density", "gradients", "rates", "additions")
 
 
 class Pass(NamedTuple):
-    """Work over all particles between prediction and correction.
+    """A computation over all particles between prediction and correction.
 
-    run(sweep) does it (`sph.passes.Sweep`). `reads` and `writes` name fields: of those it writes,
-    every value. A field that a step writes before it reads it is not carried along by a new order.
+    run(sweep) performs it (`sph.passes.Sweep`). `reads` and `writes` name fields; every value of a
+    written field is set. Fields that a step writes before reading are not reordered.
     """
 
     stage: str
@@ -76,8 +76,8 @@ class Pass(NamedTuple):
     run: Callable[[Any], None]
     reads: tuple[str, ...]
     writes: tuple[str, ...]
-    widens: bool = False  # may ask for wider lists, and is then run again
-    at_start: bool = True  # also before the first step, which has no past
+    widens: bool = False  # may request wider lists, and is then repeated
+    at_start: bool = True  # also run before the first step
 
 
 class Part:
@@ -106,16 +106,16 @@ class Part:
 
     @classmethod
     def of(cls, scene) -> "Part | None":
-        """The part as the scene's configuration asks for it, None where it does not."""
+        """Return the part for the scene's configuration, or None if it is not used."""
         raise NotImplementedError
 
     @classmethod
     def issues(cls, physics, problem) -> list[tuple[str, str]]:
-        """(key, what is wrong) of settings that are valid each by itself but not together."""
+        """Return (key, message) for settings that are valid by themselves but not together."""
         return []
 
     def described(self) -> tuple[list[str], list[tuple[str, str]]]:
-        """In words what it has compiled in, and (what, why) of what it leaves out."""
+        """Return descriptions of what is compiled, and (what, why) of what is left out."""
         return [self.title], []
 
     # --- state ---
@@ -124,53 +124,54 @@ class Part:
         """Set the part's own fields of the initial state, which are zeros."""
 
     def remake(self, state: State, missing: list[str]) -> None:
-        """Fill fields that the state of a checkpoint lacks, which are zeros."""
+        """Set the fields `missing` in a checkpoint, which are zeros."""
 
     # --- a step ---
 
     def split(self, state: State, dt: float) -> float:
-        """Act by itself for a time dt, half a step, at either end of each step (Strang 1968).
+        """Advance the state by this part alone for dt, half a step (Strang splitting).
 
-        For sources so stiff that they would bound the step. Returns the energy added.
+        Called at the beginning and end of each step, for sources that would limit the step. Returns
+        the energy added.
         """
         return 0.0
 
     def split_predicted(self, state: State, dt: float) -> None:
-        """The same on predicted values, in which the end of the step is to show."""
+        """Apply `split` to the predicted values."""
 
     def largest_courant(self) -> tuple[float, str]:
-        """The Courant number above which the leapfrog is unstable with it, and a criterion."""
+        """Return the Courant number above which this part is unstable, and its criterion."""
         return np.inf, ""
 
     def step_limit(self, state: State) -> np.ndarray | None:
-        """(N,) the longest step that each particle allows, or None. The criterion is `name`."""
+        """Return the longest step (N,) that each particle allows, or None; criterion `name`."""
         return None
 
     # --- what the history records ---
 
     def energies(self, state: State) -> dict[str, np.ndarray]:
-        """Energies per unit mass (N,) that belong to the total energy, by column of the history."""
+        """Return energies per unit mass (N,) in the total energy, by column of the history."""
         return {}
 
     def sums(self, state: State) -> dict[str, float]:
-        """Further columns of the history."""
+        """Return additional columns of the history."""
         return {}
 
     # --- faults ---
 
     def check(self, simulation) -> None:
-        """Raise NumericalError where the state is unphysical in a way that the part knows."""
+        """Raise NumericalError if the state is unphysical for this part."""
 
     def criterion_words(self, criterion: str) -> str | None:
-        """How a particle sets the step by that criterion, in words, if the part brought it."""
+        """Return a description of a criterion of this part, or None for other criteria."""
         return f"the limit of physics.{self.name}" if criterion == self.name else None
 
     def held_words(self, criterion: str) -> str | None:
-        """What holds the Courant number by that criterion, in words, if the part does."""
+        """Return what reduces the Courant number by that criterion, or None for others."""
         return None
 
     def remedies(self, trouble: str, held_by: str) -> list[str]:
-        """What to try against "long steps", "short steps", "drift" or "endless energy".
+        """Return what to try against "long steps", "short steps", "drift" or "endless energy".
 
         held_by: the criterion that sets the Courant number or, for short steps, the step.
         """

@@ -1,10 +1,11 @@
-"""Find kernels, equations of state, schemes, parts and problems by looking into their folder.
+"""Discovery of kernels, equations of state, schemes, parts and problems by folder.
 
-Beside the folders of `sph` those of `sph_extensions` are looked into, a package that users make:
-sph_extensions/kernels/mine.py on the Python path is found as sph/kernels/mine.py would be. It has
-no __init__.py, so several places may hold a share of it.
+Users may add choices in a package `sph_extensions` on the Python path: a file
+sph_extensions/kernels/mine.py is found like sph/kernels/mine.py. This package has no __init__.py,
+so it may be spread over several directories.
 """
 
+import functools
 import importlib
 import importlib.util
 import pkgutil
@@ -19,27 +20,28 @@ _known: dict[tuple, str] = {}  # modules of model classes, by what Numba tells t
 
 
 def names(package: str, folders: bool = False) -> list[str]:
-    """Names of the modules in `package`, e.g. names("sph.kernels"): one file is one choice.
+    """Return the choices in `package`, e.g. names("sph.kernels"): the names of its modules.
 
-    folders: folders are choices too, e.g. parts. Files whose name begins with an underscore or is
-    "base" are shared, not choices.
+    folders: whether subpackages are choices as well, e.g. parts. Files whose name begins with an
+    underscore or is "base" are shared code, not choices.
     """
     return sorted(_places(package, folders))
 
 
 def load(package: str, name: str, folders: bool = False) -> ModuleType:
-    """The module of that choice. Raises KeyError naming the valid ones."""
+    """Return the module of that choice. Raises KeyError that names the valid choices."""
     places = _places(package, folders)
     if name not in places:
-        raise KeyError(f"no {name!r} in {package}; there are {', '.join(sorted(places))}")
+        raise KeyError(f"no {name!r} in {package}; expected one of {', '.join(sorted(places))}")
     return importlib.import_module(f"{places[name]}.{name}")
 
 
+@functools.cache
 def model_class(package: str, name: str) -> type:
-    """The NamedTuple that a model's file defines: the one class with fields and formulas in it.
+    """Return the NamedTuple that a model's file defines.
 
-    Raises TypeError where its name is not its own in the whole program: Numba tells named tuples
-    apart by the name of the class and of the fields, so two alike would share their formulas.
+    Raises TypeError if another model has equal class and field names: Numba distinguishes named
+    tuples only by these, so both models would share their formulas.
     """
     module = load(package, name)
     (found,) = (
@@ -53,13 +55,13 @@ def model_class(package: str, name: str) -> type:
     if other != module.__name__:
         raise TypeError(
             f"{module.__name__} and {other} both define a model {found.__name__}"
-            f"({', '.join(found._fields)}), which compiled code cannot tell apart: rename one"
+            f"({', '.join(found._fields)}), which compiled code cannot distinguish. Try: rename one"
         )
     return found
 
 
 def part_class(package: str, name: str) -> type[Part]:
-    """The subclass of Part that a part's or a formulation's module defines; its name is set."""
+    """Return the subclass of Part that the module of a part or formulation defines."""
     module = load(package, name, folders=True)
     (found,) = (
         kind
@@ -71,9 +73,9 @@ def part_class(package: str, name: str) -> type[Part]:
 
 
 def model(package: str, choice: str | dict[str, Any] | None, label: str = "name"):
-    """The model that a value of the configuration names, or None where it is None.
+    """Return the model that a value of the configuration names, or None if `choice` is None.
 
-    choice: a name, or a table of parameters with the name under `label`.
+    choice: a name, or a table of parameters with the name under the key `label`.
     """
     if choice is None:
         return None
@@ -82,7 +84,7 @@ def model(package: str, choice: str | dict[str, Any] | None, label: str = "name"
 
 
 def _places(package: str, folders: bool) -> dict[str, str]:
-    """The package that holds each choice; the program's own go first."""
+    """Return the package of each choice; those of sph have precedence over extensions."""
     found: dict[str, str] = {}
     for place in (package, package.replace("sph", EXTENSIONS, 1)):
         if place != package and not _exists(place):
@@ -92,6 +94,12 @@ def _places(package: str, folders: bool) -> dict[str, str]:
                 found.setdefault(module.name, place)
     found.pop("base", None)
     return found
+
+
+def extension_folders() -> list[str]:
+    """The folders that make up `sph_extensions`, in the order of the Python path."""
+    spec = importlib.util.find_spec(EXTENSIONS)
+    return list(spec.submodule_search_locations or []) if spec else []
 
 
 def _exists(package: str) -> bool:

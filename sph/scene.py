@@ -1,4 +1,4 @@
-"""A scene: what the configuration asks for, and nothing else, in the form the engine takes."""
+"""A scene: the parts and models that a configuration selects, in the form the engine uses."""
 
 import math
 from dataclasses import dataclass
@@ -19,7 +19,7 @@ from sph.state import Field
 
 @dataclass(frozen=True)
 class Scene:
-    """The compiled-in choices of a configuration."""
+    """The models and properties of a configuration that determine the compiled code."""
 
     config: Config
 
@@ -68,18 +68,18 @@ class Scene:
 
     @cached_property
     def keeps_momentum(self) -> np.ndarray:
-        """(D,) 1.0 for axes along which total momentum is conserved: no wall, no outer force."""
+        """(D,) 1.0 for axes along which momentum is conserved (no wall, no field), else 0.0."""
         kept = all(part.keeps_momentum for part in self.all_parts)
         return np.array([kept and kind != "mirror" for kind in self.domain.boundaries], dtype=float)
 
     @cached_property
     def adds_energy(self) -> bool:
-        """Whether a part adds energy from outside, which the drift leaves out."""
+        """Whether a part adds energy, which does not count as energy drift."""
         return any(part.adds_energy for part in self.all_parts)
 
     @cached_property
     def columns(self) -> tuple[str, ...]:
-        """The columns of the history that this scene has and others do not."""
+        """The columns of the history that not every scene has."""
         found = ["held_supports"] * (self.max_support < math.inf)
         found += ["volume_ratio"] * self.is_filled
         found += [name for part in self.all_parts for name in part.columns]
@@ -87,19 +87,19 @@ class Scene:
 
     @cached_property
     def is_filled(self) -> bool:
-        """Whether gas fills a box without open sides, so that sum m/rho is to be its volume."""
+        """Whether gas fills a box without open sides, so that sum m/rho must equal its volume."""
         return self.config.problem.fills_box(self.eos) and "open" not in self.domain.boundaries
 
     @property
     def max_support(self) -> float:
-        """Where supports are held; inf where a closed axis ends them, which is an error."""
+        """Upper limit of support radii; inf unless all axes are open."""
         if any(boundary != "open" for boundary in self.domain.boundaries):
             return math.inf
         return self.physics.max_support * self.domain.largest_side
 
     @cached_property
     def step_bounds(self) -> Bounds:
-        """What bounds the time step, of what the configuration sets."""
+        """Limits on the time step from the configuration."""
         physics = self.physics
         held, criterion = physics.C, "signal_speed"
         for part in self.parts:
@@ -115,9 +115,10 @@ class Scene:
         )
 
     def initial_state(self) -> InitialState:
-        """The problem's particles. Raises ConfigError for numbers too extreme to place any.
+        """Return the problem's particles.
 
-        Problems square lengths and count lattice cells before there is a particle to check.
+        Raises ConfigError for numbers so extreme that placement fails: problems square lengths and
+        count lattice cells before any particle can be checked.
         """
         problem = self.config.problem
         try:
@@ -126,12 +127,12 @@ class Scene:
         except (ArithmeticError, ValueError) as error:
             raise ConfigError(
                 f"problem.name = {problem.name}: particles cannot be placed with these settings "
-                f"({error}).\nTry: numbers in [problem] that are nearer to 1, and sides of "
-                "problem.domain of similar length."
+                f"({error}).\nTry: numbers in [problem] closer to 1, and sides of problem.domain "
+                "of similar length."
             ) from error
 
     def described(self) -> tuple[list[str], list[str]]:
-        """What is compiled in, and what was left out and why, in words."""
+        """Return descriptions of the parts that are compiled, and of those left out and why."""
         inside = [f"{self.dimension}-D, {len(self.domain.images.sign)} image(s) of the box"]
         outside = []
         for part in self.all_parts:

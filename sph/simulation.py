@@ -4,7 +4,7 @@ import numpy as np
 from numba.core.registry import cpu_target
 
 from sph import faults, passes, resolution, totals
-from sph.clock import Clock
+from sph.clock import STARTING, Clock
 from sph.integrators import leapfrog, step_size
 from sph.neighbours.order import number_of_blocks
 from sph.neighbours.search import Origin, Search
@@ -15,21 +15,21 @@ from sph.state import State
 from sph.threads import Team
 from sph.watchdog import Watchdog
 
-# Each widening lists to at least the radius that was asked for, which grows by 2 at the most.
+# Each widening extends lists at least to the requested radius, which grows at most by a factor 2.
 MAX_WIDENINGS = 60
 
 
 class Simulation:
-    """The state of particles and the means to move it on.
+    """The state of a run and the methods that advance it.
 
-    Attributes of use to others: particles, time, step (steps taken), limit (the coming step and
-    what sets it), totals, energy_drift, energy_added, energy_injected, scene, search.origin,
-    clock, watchdog.
+    Public attributes: particles, time, step (number of steps), limit (the next step and its
+    criterion), totals, energy_drift, energy_added, energy_injected, scene, search.origin, clock,
+    watchdog.
     """
 
     def __init__(self, scene: Scene, particles: State, threads: int, clock: Clock):
-        with clock.phase("start of Numba"):
-            # its tables are filled on first use; here, so that no phase of a step pays for it
+        with clock.phase(STARTING):
+            # Numba fills its tables on first use; done here, so that no other phase is charged
             cpu_target.target_context.refresh()
         self.scene = scene
         self.particles = particles
@@ -38,9 +38,9 @@ class Simulation:
         self.search = Search(scene.domain, self.team)
         self.time = 0.0
         self.step = 0
-        self.steps_here = 0  # of this session, which a restart begins anew
+        self.steps_here = 0  # since the start or the last restart
         self.list_builds = 0
-        self.held_supports = 0  # particles too lonely for a support within physics.max_support
+        self.held_supports = 0  # number of particles whose support is limited by max_support
         self.limit = None
         self.totals = None
         self.baseline = None  # of the energy drift: set at the start, or by `go_on_from`
@@ -61,14 +61,14 @@ class Simulation:
 
     @classmethod
     def start(cls, scene: Scene, threads: int, clock: Clock) -> "Simulation":
-        """From the problem's initial state, ready for the first step. Raises NumericalError."""
+        """Return a simulation ready for its first step. Raises NumericalError."""
         self = cls.of_problem(scene, threads, clock)
         self.begin()
         return self
 
     @classmethod
     def of_problem(cls, scene: Scene, threads: int, clock: Clock) -> "Simulation":
-        """The problem's initial state, of which nothing has been computed yet."""
+        """Return a simulation with the problem's initial state, before `begin`."""
         with clock.phase("initial state"):
             particles = State.at_start(scene.fields, *scene.initial_state())
             for part in scene.all_parts:
@@ -76,7 +76,7 @@ class Simulation:
         return cls(scene, particles, threads, clock)
 
     def begin(self) -> None:
-        """Converged supports, rates, and the first step. Raises NumericalError."""
+        """Compute converged supports, rates, and the first step size. Raises NumericalError."""
         self.watchdog.check_range(self)
         resolution.check_extent(self)
         leapfrog.keep(self.particles, self.evolved)
@@ -95,9 +95,9 @@ class Simulation:
         cls, scene: Scene, particles: State, time: float, step: int, next_step: float,
         origin: Origin, threads: int, clock: Clock, budget: totals.Budget | None = None,
     ) -> "Simulation":  # fmt: skip
-        """From a checkpoint, to go on bit for bit as if there had been no stop.
+        """Return a simulation that continues a checkpoint bit for bit.
 
-        budget: None begins the energy budget anew.
+        budget: the energy budget of the checkpoint; None starts a new budget.
         """
         self = cls(scene, particles, threads, clock)
         self.time, self.step = time, step
@@ -112,19 +112,19 @@ class Simulation:
 
     @property
     def budget(self) -> totals.Budget:
-        """What a restart needs to go on with the energy budget."""
+        """The energy budget that a restart continues."""
         baseline = self.baseline or totals.Baseline(0.0, 0.0)  # of a run that failed at its start
         return totals.Budget(self.energy_injected, self.energy_added, baseline)
 
     def go_on_from(self, budget: totals.Budget) -> None:
-        """Count energies on from `budget`, and measure the drift from its baseline."""
+        """Continue the counts of energy in `budget`, and measure energy drift from its baseline."""
         self.energy_injected, self.energy_added, self.baseline = budget
         self.energy_drift = self.baseline.drift(self.totals, self.energy_added)
 
     def advance(self, until: float) -> None:
-        """One step (the nine of docs/equations.md), cut where it would pass `until`.
+        """Take one step (steps 1-9 of docs/equations.md), cut to end at `until` at the latest.
 
-        Raises NumericalError where the new state is unphysical.
+        Raises NumericalError if the new state is unphysical.
         """
         allowed = self.limit.dt
         dt, landing = allowed, False
@@ -153,13 +153,13 @@ class Simulation:
 
     @property
     def volume_ratio(self) -> float | None:
-        """Sum of m/rho over the volume of the box, None where gas does not fill a closed box."""
+        """Sum of m/rho over the volume of the box; None unless gas fills a closed box."""
         return self.totals.volume / self.scene.domain.volume if self.scene.is_filled else None
 
     def nearest(self) -> np.ndarray:
-        """(N,) distance of each particle to its nearest neighbour, in particle spacings.
+        """Return the distance (N,) of each particle to its nearest neighbour, in spacings.
 
-        inf where no neighbour lies within the support.
+        inf if there is no neighbour within the support radius.
         """
         p = self.particles
         found = np.empty(p.number)
@@ -168,7 +168,7 @@ class Simulation:
         return found
 
     def columns(self) -> dict[str, float]:
-        """The columns of the history that only some scenes have (`Scene.columns`)."""
+        """Return the columns of the history that only some scenes have (`Scene.columns`)."""
         scene, found = self.scene, dict(self.totals.energies)
         if scene.max_support < np.inf:
             found["held_supports"] = self.held_supports
@@ -186,7 +186,7 @@ class Simulation:
     # --- the parts of a step ---
 
     def _build_lists(self, dt: float, guess: bool = False) -> None:
-        """Order the particles anew and list their candidates."""
+        """Reorder the particles and build the candidate lists."""
         p = self.particles
         self.list_builds += 1
         with self.clock.phase("order"):
@@ -210,7 +210,7 @@ class Simulation:
         )
 
     def _make(self, one: Pass) -> None:
-        """Run a pass; lists are widened, and it is run again, for as long as it asks for that."""
+        """Run a pass, and repeat it with wider lists as long as it requests them."""
         sweep, p = self._sweep, self.particles
         sweep.wanted.fill(1.0)
         for _ in range(MAX_WIDENINGS if one.widens else 1):
@@ -228,7 +228,7 @@ class Simulation:
         raise faults.starved(self, int(np.argmax(sweep.wanted)))
 
     def _check_found(self) -> None:
-        """Count the supports that are held; raise where one has no root however small it is."""
+        """Count supports limited by max_support. Raise NumericalError if one was not found."""
         p, most = self.particles, self.scene.max_support
         if most < np.inf:
             self.held_supports = int(np.count_nonzero(p.support == most))
@@ -236,12 +236,12 @@ class Simulation:
             raise faults.crowded(self)
 
     def _split(self, dt: float) -> None:
-        """What parts that act by themselves do in half a step."""
+        """Apply the parts that are split from the flow for half a step."""
         for part in self.scene.all_parts:
             self.energy_added += part.split(self.particles, dt)
 
     def _measure(self, past: step_size.Past | None) -> None:
-        """Step 8, the sums of the history, and whether the state is physical."""
+        """Do step 8: totals, energy drift, the next step, and the watchdog's checks."""
         with self.clock.phase("step size, sums"):
             scene, p = self.scene, self.particles
             self.totals = totals.of(p, scene.all_parts, scene.keeps_momentum)
@@ -254,10 +254,7 @@ class Simulation:
 
 
 def carried(scene: Scene) -> tuple[str, ...]:
-    """The fields that a new order must carry along: all that a step reads before it writes them.
-
-    What the first pass to touch a field writes without reading it is made anew.
-    """
+    """Return the fields that must be reordered: those that a step reads before writing."""
     read: set[str] = set()
     written: set[str] = set()
     for one in scene.passes:

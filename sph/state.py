@@ -1,17 +1,16 @@
-"""The state: named arrays with one entry a particle, each declared once by the part that owns it.
+"""The state: named arrays with one entry per particle, each declared once by the part that owns it.
 
-Everything that handles arrays follows the declaration: mirror signs, reordering, checkpoints,
-public names and units, lookup by name.
+The declaration determines signs at mirrors, reordering, checkpoints, public names and units.
 """
 
 from collections.abc import Iterable, Mapping
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 
 class Public(NamedTuple):
-    """How other programs see a field: its name, the exponents of its unit, and what it is."""
+    """A field in the public part of a checkpoint: name, exponents of its unit, description."""
 
     name: str
     length: int
@@ -31,7 +30,7 @@ class Field(NamedTuple):
     name: str
     rank: int = 0
     stored: bool = True  # in checkpoints; else a work array
-    remade: bool = False  # a restart can compute it anew, so a checkpoint may lack it
+    remade: bool = False  # a restart can compute it, so it may be missing in a checkpoint
     above: float | None = None  # bounds of a physical value
     at_least: float | None = None
     integer: bool = False
@@ -43,41 +42,69 @@ class Field(NamedTuple):
 
 # What every formulation has.
 COMMON = (
-    Field("id", integer=True, public=Public("ParticleIDs", 0, 0, 0, 0, "What stays with a particle, from 1")),
+    Field(
+        "id",
+        integer=True,
+        public=Public("ParticleIDs", 0, 0, 0, 0, "Identification number, from 1"),
+    ),
     Field("mass", above=0.0, public=Public("Masses", 0, 1, 0, 0, "Mass")),
-    Field("position", 1, public=Public("Coordinates", 1, 0, 0, 1, "Position from the corner of the box; add Header/Origin")),
-    Field("velocity", 1, public=Public("Velocities", 1, 0, -1, 0, "Velocity")),
-    Field("internal_energy", at_least=0.0, public=Public("InternalEnergies", 2, 0, -2, -2, "Internal energy per unit mass")),
-    Field("support", above=0.0, public=Public("SmoothingLengths", 1, 0, 0, 1, "Smoothing length h; the kernel ends at H = (H/h) h")),
-    Field("density", above=0.0, public=Public("Densities", -3, 1, 0, -3, "Density, per D-dimensional volume")),
-    Field("acceleration", 1),
+    Field(
+        "position",
+        rank=1,
+        public=Public(
+            "Coordinates", 1, 0, 0, 1, "Position from the corner of the box; add Header/Origin"
+        ),
+    ),
+    Field("velocity", rank=1, public=Public("Velocities", 1, 0, -1, 0, "Velocity")),
+    Field(
+        "internal_energy",
+        at_least=0.0,
+        public=Public("InternalEnergies", 2, 0, -2, -2, "Internal energy per unit mass"),
+    ),
+    Field(
+        "support",
+        above=0.0,
+        public=Public(
+            "SmoothingLengths", 1, 0, 0, 1, "Smoothing length h; the kernel ends at H = (H/h) h"
+        ),
+    ),
+    Field(
+        "density",
+        above=0.0,
+        public=Public("Densities", -3, 1, 0, -3, "Density, per D-dimensional volume"),
+    ),
+    Field("acceleration", rank=1),
     Field("energy_rate"),
-    Field("predicted_velocity", 1, stored=False),  # at the full step (eqs 4 and 5)
+    Field("predicted_velocity", rank=1, stored=False),  # at the full step (eqs 4 and 5)
     Field("predicted_energy", stored=False),
     Field("support_before", stored=False),  # H of the step before
     Field("sound_speed", stored=False),
     Field("signal_speed", stored=False),  # the largest of the particle's pairs (eq 32)
-)  # fmt: skip
+)
 
 
 class State:
-    """N particles in D dimensions: one attribute a field, float64 but for the IDs, in code units.
+    """N particles in D dimensions: one attribute per field, float64 except IDs, in code units.
 
-    The memory order is that of the neighbour blocks and changes when they are rebuilt;
-    `id` (from 1) is what stays with a particle.
+    The memory order is that of the neighbour blocks and changes when these are rebuilt. `id` (from
+    1) identifies a particle during the whole run.
     """
 
     def __init__(self, fields: Iterable[Field], arrays: Mapping[str, np.ndarray]):
-        """The fields of which `arrays` has one, in the order of their declaration."""
+        """Create a state with the `fields` that are in `arrays`, in the order of declaration."""
         self.fields = tuple(field for field in fields if field.name in arrays)
         for field in self.fields:
             setattr(self, field.name, arrays[field.name])
+
+    if TYPE_CHECKING:  # the fields, which parts declare
+
+        def __getattr__(self, name: str) -> np.ndarray: ...
 
     @classmethod
     def at_start(
         cls, fields: Iterable[Field], position, velocity, mass, internal_energy
     ) -> "State":
-        """Particles with IDs 1 … N in the order given, and zeros where nothing is computed yet."""
+        """Return particles with IDs 1 … N in the given order; all other fields are zero."""
         dimension, n = position.shape
         given = {
             "position": position, "velocity": velocity, "mass": mass,
@@ -102,11 +129,11 @@ class State:
         return self.position.shape[0]
 
     def get(self, name: str) -> np.ndarray | None:
-        """The array of that name, or None where no part of the scene declares it."""
+        """Return the array of that name, or None if no part of the scene declares it."""
         return self.__dict__.get(name)
 
     def declare(self, fields: Iterable[Field]) -> list[str]:
-        """Have exactly these fields: others go, new ones are zeros. Returns the names of the new."""
+        """Keep exactly these fields; add missing ones as zeros and return their names."""
         fields, known = tuple(fields), {field.name for field in self.fields}
         for name in known - {field.name for field in fields}:
             delattr(self, name)
@@ -117,20 +144,20 @@ class State:
         return [field.name for field in new]
 
     def arrays(self) -> dict[str, np.ndarray]:
-        """The arrays that a checkpoint stores, by name."""
+        """Return the arrays that a checkpoint stores, by name."""
         return {field.name: getattr(self, field.name) for field in self.fields if field.stored}
 
     def subset(self, indices: np.ndarray) -> "State":
-        """A copy of the stored fields of the particles of these indices, in their order."""
+        """Return a copy of the stored fields for the particles `indices`, in that order."""
         arrays = self.arrays().items()
         chosen = {name: np.ascontiguousarray(array[..., indices]) for name, array in arrays}
         return State(self.fields, chosen)
 
     def by_id(self) -> "State":
-        """A copy ordered by ID, to compare two runs or to plot."""
+        """Return a copy in order of ID, to compare runs or to plot."""
         return self.subset(np.argsort(self.id, kind="stable"))
 
     def reorder(self, order: np.ndarray, names: Iterable[str]) -> None:
-        """Put the arrays of those names into another memory order, (N,) indices."""
+        """Reorder the arrays `names` in memory by `order`, (N,) indices."""
         for name in names:
-            setattr(self, name, np.ascontiguousarray(getattr(self, name)[..., order]))
+            setattr(self, name, getattr(self, name).take(order, axis=-1))

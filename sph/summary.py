@@ -61,13 +61,13 @@ class Conservation(TypedDict):
     """What the run conserved, over its whole history."""
 
     # Change of energy over the energy at the start (`sph.totals.Baseline`): without bulk motion and
-    # without what heating added. At the end, and its largest modulus at any step.
+    # without what sources added. At the end, and its largest modulus at any step.
     energy_drift: float
     energy_drift_max: float
     # Energy that kept internal energies positive: a part of the drift, over the same scale.
     energy_injected: float
     # Largest |P - P_0| at any step over sum m (|v - v_bulk| + c_s) of the last state, along the
-    # axes that conserve momentum; None where no axis does (walls, an external field).
+    # axes that conserve momentum; None where no axis does (walls, an outer force).
     momentum_change: float | None
     # Sum m/rho over the volume of the box, at the end and at the step where it is farthest from 1;
     # None where gas does not fill a closed box.

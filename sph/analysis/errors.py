@@ -1,4 +1,4 @@
-"""Norms of the difference between a state and its exact solution."""
+"""Errors of a state: norms of its difference from the exact solution."""
 
 import numpy as np
 
@@ -10,7 +10,7 @@ FIELDS = ("density", "velocity", "pressure", "internal_energy")
 
 
 def norms(difference, volume) -> AbsoluteNorms:
-    """Volume-weighted norms of `difference` (N,) or (D, N), of which the length is taken.
+    """Volume-weighted norms of `difference` (N,), or of the length of a vector (D, N).
 
     L1 = sum V |d| / sum V, L2 = sqrt(sum V d^2 / sum V), Linf = max |d|; volume (N,) = m/rho.
     """

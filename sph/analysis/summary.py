@@ -177,7 +177,7 @@ def _ending(summary: Summary) -> str:
 
 def _changes_in_words(summary: Summary) -> list[str]:
     changed = summary["settings_changed"]
-    return [f"Settings changed on the way: {'; '.join(changed)}."] if changed else []
+    return [f"Settings changed in restarts: {'; '.join(changed)}."] if changed else []
 
 
 def _errors_in_words(summary: Summary) -> str:

@@ -1,7 +1,7 @@
-"""The table [physics]: keys of every formulation here, those of the parts from their declarations."""
+"""The table [physics]: the keys of every formulation, and those that parts declare."""
 
 import functools
-from typing import Annotated, Any, ClassVar
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 from pydantic import Field, create_model, model_validator
 
@@ -21,6 +21,10 @@ class Physics(Section):
 
     # The formulation and every part that can join it.
     kinds: ClassVar[tuple[type[Part], ...]] = ()
+
+    if TYPE_CHECKING:  # the keys that parts declare
+
+        def __getattr__(self, name: str) -> Any: ...
 
     formulation: Annotated[str, Choice(FORMULATIONS, folders=True)] = Field(
         DEFAULT,

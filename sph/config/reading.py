@@ -145,10 +145,13 @@ def resolve(
     problem = _problem_class(raw["problem"], issues)
     if problem is not None:
         models["problem"] = problem
-        _fill_defaults(raw, problem)
+        raw["physics"].setdefault(
+            "formulation", problem.defaults.get("physics.formulation", physics.DEFAULT)
+        )
+        models["physics"] = physics.chosen(raw["physics"])
+        _fill_defaults(raw, problem, models)
         _fill_tables(raw["problem"], source, problem)
         issues += checks.shape_issues(raw["problem"], problem)
-    models["physics"] = physics.chosen(raw["physics"])
     issues += not_finite(raw)
     found = {}
     for name, model in models.items():
@@ -242,10 +245,17 @@ def _problem_class(raw: dict[str, Any], issues: list[Issue]) -> type[Problem] | 
     return None
 
 
-def _fill_defaults(raw: dict[str, dict[str, Any]], problem: type[Problem]) -> None:
-    """Add the problem's own defaults to keys that the user did not give."""
+def _fill_defaults(
+    raw: dict[str, dict[str, Any]], problem: type[Problem], models: dict[str, type[Section]]
+) -> None:
+    """Add the problem's own defaults to keys that the user did not give.
+
+    A default for a key that the formulation does not have is for another formulation.
+    """
     for key, value in problem.defaults.items():
         table, name = key.split(".", 1)
+        if name not in models[table].model_fields:
+            continue
         if _IN_PLACE_OF.get(key) not in raw[table]:
             raw[table].setdefault(name, value)
 

@@ -1,4 +1,4 @@
-"""The tables other than [problem] and [physics]: type, default, help and restart class of each key."""
+"""The tables other than [problem] and [physics]: type, default and help of each key."""
 
 import os
 from typing import Annotated, ClassVar, Literal

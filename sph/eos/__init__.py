@@ -43,15 +43,15 @@ def sound_speed(self: EquationOfState, density: Any, pressure: Any) -> Any:
 
 
 def is_gamma_law(eos: EquationOfState) -> bool:
-    """Whether P + p_inf = (gamma - 1)(rho u - p_inf), which has an exact Riemann solution."""
+    """Return whether P + p_inf = (gamma - 1)(rho u - p_inf), as `sph.exact.riemann` requires."""
     return hasattr(eos, "gamma") and hasattr(eos, "p_inf")
 
 
 def is_ideal(eos: Any) -> bool:
-    """Whether P = (gamma - 1) rho u."""
+    """Return whether P = (gamma - 1) rho u."""
     return is_gamma_law(eos) and eos.p_inf == 0.0
 
 
 def make(name: str, **parameters: Any) -> EquationOfState:
-    """The equation of state of that name, e.g. make("ideal_gas", gamma=1.4)."""
+    """Return the equation of state of that name, e.g. make("ideal_gas", gamma=1.4)."""
     return registry.model_class("sph.eos", name)(**parameters)

@@ -14,7 +14,7 @@ class IdealGas(NamedTuple):
 
     gamma: Annotated[float, Parameter("adiabatic index, the ratio of specific heats", above=1.0)]
 
-    p_inf = 0.0  # no parameter: what a stiffened gas has
+    p_inf = 0.0  # not a parameter: the value of a stiffened gas that is ideal
 
     def pressure(self, density, internal_energy):
         return (self.gamma - 1.0) * density * internal_energy  # eq 19

@@ -1,6 +1,6 @@
-"""Formulations: which equations are solved for density and rates. One folder each.
+"""Formulations, one folder each: the equations for density and rates.
 
-The folder's `__init__.py` defines one subclass of `Formulation`.
+The `__init__.py` of a folder defines one subclass of `Formulation`.
 """
 
 import numpy as np
@@ -13,18 +13,18 @@ PRESSURE = Public("Pressures", -1, 1, -2, -5, "Pressure")
 
 
 class Formulation(Part):
-    """The part that every scene has one of (`physics.formulation`)."""
+    """The part with the basic equations (`physics.formulation`), of which a scene has one."""
 
     fields = COMMON
-    # The models that passes take, and those at the start, which has no past to begin from.
+    # The models of the passes, and those of the first passes, which have no initial guess.
     models: tuple
     starting_models: tuple
 
     @property
     def label(self) -> str:
-        """What the equations are called in a checkpoint."""
+        """Name of the equations in a checkpoint."""
         return self.name
 
     def pressure(self, state: State) -> np.ndarray:
-        """(N,) pressure of the state at the end of a step."""
+        """Return the pressure (N,) of the state at the end of a step."""
         raise NotImplementedError

@@ -1,4 +1,4 @@
-"""Smoothing kernels: W(r, H) = H^-D w(r/H) with compact support r < H (eq 9)."""
+"""Smoothing kernels: W(r, H) = H^-D w(r/H), zero for r >= H, the support radius (eq 9)."""
 
 import functools
 from collections.abc import Mapping
@@ -67,9 +67,9 @@ def force_over_q(self: Kernel, dim: Dim, q: Any) -> Any:
 
 @functools.lru_cache(64, typed=True)  # typed: kernels of two classes may hold equal parameters
 def support_ratio(kernel: Kernel, dimension: int) -> float:
-    """H/h = 1/(2 sigma), sigma the kernel's standard deviation per axis (Dehnen & Aly 2012)."""
+    """Return H/h = 1/(2 sigma), with sigma the kernel's standard deviation (Dehnen & Aly 2012)."""
     dim = (0,) * dimension
-    # Gauss's rule is exact for the polynomials that a kernel is made of, joined at sixths.
+    # Gauss-Legendre quadrature is exact, since kernels are polynomials between multiples of 1/6.
     node, weight = np.polynomial.legendre.leggauss(20)
     q = ((node + 1) / 2 + np.arange(6)[:, None]).ravel() / 6
     shell = np.tile(weight, 6) * q ** (dimension - 1) * kernel.w(dim, q)
@@ -78,5 +78,5 @@ def support_ratio(kernel: Kernel, dimension: int) -> float:
 
 
 def make(name: str, **parameters: Any) -> Kernel:
-    """The kernel of that name, e.g. make("cubic_spline", flattened=True)."""
+    """Return the kernel of that name, e.g. make("cubic_spline", flattened=True)."""
     return registry.model_class("sph.kernels", name)(**parameters)

@@ -1,4 +1,4 @@
-"""Wendland C2 kernel (seed eqs 11-14; Dehnen & Aly 2012, table 1)."""
+"""Wendland C2 kernel (eqs 11-14; Dehnen & Aly 2012, table 1)."""
 
 import math
 from typing import NamedTuple

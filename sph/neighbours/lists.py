@@ -1,7 +1,7 @@
-"""Candidate lists: for each block, every particle (or image) that may come within a support of it.
+"""Candidate lists: for each block, all particles and images that may become neighbours of it.
 
-A list serves all particles of its block and lives until some particle has moved, or grown its
-support, by its share of the skin. It is stored as one integer a candidate: particle and image.
+A list serves all particles of its block. It is valid until a particle has moved, or its support
+radius has grown, by more than the skin allows. A candidate is one integer: particle and image.
 """
 
 from typing import NamedTuple
@@ -15,7 +15,7 @@ from sph.neighbours.order import BLOCK, number_of_blocks
 from sph.neighbours.tree import Tree
 from sph.threads import SMALLEST_RANGE, Team
 
-CHUNK = 32  # blocks that share a stretch of the storage
+CHUNK = 32  # blocks that share a region of the storage
 IMAGE_SHIFT = 26  # low bits of a candidate: the particle; above them the image
 SHORT_IMAGES = 1 << (31 - IMAGE_SHIFT)  # with so many images a candidate fits into 32 bits
 MAX_PARTICLES = 1 << IMAGE_SHIFT
@@ -31,18 +31,18 @@ class Lists(NamedTuple):
 
 @njit(**COMPILED)
 def _gap(lower_a, upper_a, lower_b, upper_b):
-    """Distance between two intervals, zero where they touch."""
+    """Return the distance between two intervals, 0 if they overlap."""
     return max(0.0, max(lower_b - upper_a, lower_a - upper_b))
 
 
 @njit(**COMPILED, forceinline=True)
 def _fill(chunk, dim, tree, position, support, stretch, images, region, start, count, candidates):
-    """List the blocks of one chunk into its region; return how much room they need."""
+    """Fill the lists of a chunk's blocks into its region; return the room they need."""
     first, last, lower, upper, largest = tree
     sign, offset = images
     begin_of_region = region[chunk]
     room = region[chunk + 1] - begin_of_region
-    D = len(dim)  # a constant to the compiler, which unrolls the loops over it
+    D = len(dim)  # a compile-time constant, so that loops over it are unrolled
     n = support.size
     blocks = start.size
     nodes_on_stack = np.empty(128, np.int64)
@@ -99,7 +99,7 @@ def _fill(chunk, dim, tree, position, support, stretch, images, region, start, c
                     reach = stretch * max(H_block, support[j])
                     if squared >= reach * reach:
                         continue
-                    # Within reach of the box. At its rim: keep it if it is in reach of a particle.
+                    # j is within reach of the block's box. Near its edge, check each particle.
                     nearest = farthest - (stretch * support_least) ** 2
                     if nearest >= 0.0:
                         for p in range(BLOCK):
@@ -151,11 +151,11 @@ def build(
     tree: Tree, position: np.ndarray, support: np.ndarray, skin: float, images: Images, team: Team,
     room: np.ndarray | None = None,
 ) -> tuple[Lists, np.ndarray]:  # fmt: skip
-    """Lists of all blocks, and the room each chunk of them needed.
+    """Return the lists of all blocks, and the room (chunks,) that each chunk needed.
 
-    position (D, N) and support (N,) in block order, `tree` built from them; candidates lie
-    within (1 + skin) max(H_i, H_j) of a particle i of the block. `room` (chunks,): what an earlier
-    build needed, to size the storage; where it falls short the build is done once more.
+    position: (D, N), support: (N,), in block order; tree: built from them. Candidates are within
+    (1 + skin) max(H_i, H_j) of a particle i of the block. room: the room that an earlier build
+    needed, to size the storage; if it is too small, the lists are built again.
     """
     dim = (0,) * position.shape[0]
     blocks = number_of_blocks(support.size)

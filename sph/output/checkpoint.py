@@ -36,25 +36,25 @@ FORMAT_VERSION = 2
 
 NOT_PARTICLES = ("time", "step", "next_step", "list_position", "list_support", "list_skin")
 
-# Last in the lineage of a file that holds some particles alone, which no run goes on from.
+# Last in the lineage of a file that contains only some particles, which cannot be restarted.
 PART = "a particle that failed and its neighbours, alone"
 
-START_ELSEWHERE = "Try: an earlier checkpoint of the run, or start the run anew."
+START_ELSEWHERE = "Try: an earlier checkpoint of the run, or start the run again."
 
 
 @dataclass
 class Checkpoint:
-    """The state at the end of a step, and all that a restart needs to go on bit for bit."""
+    """The state at the end of a step, and all that a restart needs to continue bit for bit."""
 
     particles: State
     time: float
     step: int  # steps done
-    next_step: float  # dt of the coming step, before it is cut to land on an output
+    next_step: float  # dt of the next step, before it is cut to end at an output
     list_position: np.ndarray  # (D, N) where the neighbour lists were built
     list_support: np.ndarray  # (N,) H with which they were built
     list_skin: float  # their skin, as a fraction of H
     config: configuration.Config
-    lineage: tuple[str, ...]  # the runs it came from, oldest first
+    lineage: tuple[str, ...]  # restarts of the run, oldest first
     budget: Budget | None = None  # None: of format 1, which leaves them to the history
     computed_by: str | None = None  # of one that was read: `fingerprint.as_json` of its writer
 
@@ -82,10 +82,7 @@ class Checkpoint:
 
 
 def write(path: Path, checkpoint: Checkpoint) -> None:
-    """Write `checkpoint` to `path`: the whole file or, after an error or a kill, none of it.
-
-    Raises FileError where the file system refuses.
-    """
+    """Write `checkpoint` to `path` atomically. Raises FileError."""
     state = _state(checkpoint)
     with (
         ThreadPoolExecutor(1) as beside,
@@ -95,16 +92,16 @@ def write(path: Path, checkpoint: Checkpoint) -> None:
         digest = beside.submit(state_hash, state)  # while HDF5 waits for the disk
         with h5py.File(disk, "w") as file:
             layout.write_public(file, checkpoint)
-            _write_private(hdf5.create_group(file, GROUP), checkpoint, state, digest)
+            _write_private(hdf5.create_group(file.id, GROUP), checkpoint, state, digest)
         seal(disk)
         disk.raise_failure()
 
 
 def read(path: Path) -> Checkpoint:
-    """The checkpoint in `path`, bit for bit as it was written.
+    """Return the checkpoint in `path`, bit for bit as it was written.
 
-    Raises Damaged where its content is not what was written; FileError where it is missing, cannot
-    be read, is not a checkpoint, of another format, or holds what no run writes.
+    Raises Damaged if its content is not what was written, and FileError if it is missing, cannot be
+    read, is not a checkpoint, has another format, or does not hold a valid state.
     """
     path = Path(path)
     try:
@@ -112,7 +109,7 @@ def read(path: Path) -> Checkpoint:
             state, texts = _stored(path, file)
     except FileNotFoundError:
         raise FileError(
-            f"there is no checkpoint {path}.\nTry: `ls {path.parent}` for those there are."
+            f"{path}: checkpoint not found.\nTry: `ls {path.parent}` for existing ones."
         ) from None
     _check_hashes(path, state, texts)
     config = _config(path, texts["configuration"])
@@ -145,7 +142,7 @@ def _fields(particles: State) -> str:
     return json.dumps({f.name: [f.rank, f.remade] for f in particles.fields if f.stored})
 
 
-def _write_private(group: h5py.Group, checkpoint: Checkpoint, state, digest) -> None:
+def _write_private(group: h5py.h5g.GroupID, checkpoint: Checkpoint, state, digest) -> None:
     """Write the state; digest: the future of its SHA-256."""
     for name, array in state.items():
         hdf5.write_dataset(group, name, array)  # no checksum of HDF5's: two digests are enough
@@ -205,12 +202,12 @@ def _refusal(path: Path, refused: Refused, sealed: bool) -> FileError:
     if refused.kind == "format":
         version = int(refused.text)
         age, remedy = (
-            ("a newer", "a newer sph")
+            ("a newer", "a newer version of sph")
             if version > FORMAT_VERSION
-            else ("an older", "the sph that wrote it, or start the run anew")
+            else ("an older", "the version of sph that wrote it, or start the run again")
         )
         return FileError(
-            f"{path} is of {age} format ({version}) than this sph {__version__} reads "
+            f"{path} has {age} format ({version}) than this version of sph ({__version__}) reads "
             f"({FORMAT_VERSION}).\nTry: {remedy}."
         )
     if refused.kind == "damaged":
@@ -252,8 +249,8 @@ def _config(path: Path, text: str) -> configuration.Config:
         return configuration.from_text(text, f"the configuration in {path}")
     except (ConfigError, RecursionError) as error:
         raise FileError(
-            f"{path} holds a configuration that this sph {__version__} does not take: {error}\n"
-            "Try: the sph that wrote it, or start the run anew."
+            f"{path} has a configuration that is invalid in this version of sph ({__version__}): "
+            f"{error}\nTry: the version of sph that wrote it, or start the run again."
         ) from error
 
 

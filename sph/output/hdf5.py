@@ -15,30 +15,36 @@ from h5py import h5a, h5d, h5g, h5p, h5s, h5t
 TEXT = h5py.string_dtype()
 
 
-def create_group(parent: h5py.Group, name: str) -> h5py.Group:
-    return h5py.Group(h5g.create(parent.id, name.encode()))
+def create_group(parent: h5g.GroupID, name: str) -> h5g.GroupID:
+    """A new group in the group or file `parent`: both are what h5py's objects have as `id`."""
+    return h5g.create(parent, name.encode())
 
 
-def write_attributes(owner: h5py.Group | h5py.Dataset, attributes: Mapping[str, object]) -> None:
+def write_attributes(owner: h5g.GroupID | h5d.DatasetID, attributes: Mapping[str, object]) -> None:
     """Attach new attributes: numbers, arrays of numbers, np.bytes_ (ASCII) and str (UTF-8)."""
     for name, value in attributes.items():
         kind = TEXT if isinstance(value, str) else None
         data = np.asarray(value, dtype=kind, order="C")
         stored, in_memory = _text_types() if kind else _types(data.dtype)
-        attribute = h5a.create(owner.id, name.encode(), stored, _space(data.shape))
+        attribute = h5a.create(owner, name.encode(), stored, _space(data.shape))
         attribute.write(data, mtype=in_memory)
 
 
 def write_dataset(
-    group: h5py.Group, name: str, array: np.ndarray, chunks: tuple[int, ...] | None = None
-) -> h5py.Dataset:
+    group: h5g.GroupID, name: str, array: np.ndarray, chunks: tuple[int, ...] | None = None
+) -> h5d.DatasetID:
     """A new dataset; with `chunks`, their shape, it is checked when it is read (Fletcher-32)."""
     data = np.asarray(array, order="C")
     stored, in_memory = _types(data.dtype)
     plan = _plan_of_dataset(chunks)
-    dataset = h5d.create(group.id, name.encode(), stored, _space(data.shape), dcpl=plan)
+    dataset = h5d.create(group, name.encode(), stored, _space(data.shape), dcpl=plan)
     dataset.write(h5s.ALL, h5s.ALL, data, mtype=in_memory)
-    return h5py.Dataset(dataset)
+    return dataset
+
+
+def link(group: h5g.GroupID, name: str, target: str) -> None:
+    """A soft link to the path `target`."""
+    group.links.create_soft(name.encode(), target.encode())
 
 
 # Types, shapes and plans belong to no file: each is made once.

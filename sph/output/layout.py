@@ -72,19 +72,20 @@ def in_frame(frame: Frame, boundaries: tuple[str, ...], position: np.ndarray) ->
 
 def write_public(file: h5py.File, checkpoint) -> None:
     """Write all public groups of `checkpoint` (a sph.output.checkpoint.Checkpoint)."""
+    root = file.id
     particles, problem = checkpoint.particles, checkpoint.config.problem
     frame = frame_of(problem, particles.position)
     for name, attributes in _header(checkpoint, frame).items():
-        hdf5.write_attributes(hdf5.create_group(file, name), attributes)
-    group = hdf5.create_group(file, "PartType0")
+        hdf5.write_attributes(hdf5.create_group(root, name), attributes)
+    group = hdf5.create_group(root, "PartType0")
     for public, array in _fields(checkpoint, frame):
         dataset = write_array(group, public.name, array)
         hdf5.write_attributes(dataset, _unit_attributes(public))
     for link, target in SINGULAR.items():
-        group[link] = h5py.SoftLink(f"/PartType0/{target}")
+        hdf5.link(group, link, f"/PartType0/{target}")
 
 
-def write_array(group: h5py.Group, name: str, array: np.ndarray) -> h5py.Dataset:
+def write_array(group: h5py.h5g.GroupID, name: str, array: np.ndarray) -> h5py.h5d.DatasetID:
     """A dataset in which damage is found when it is read (Fletcher-32)."""
     chunks = tuple(min(length, LONGEST_CHUNK) for length in array.shape)
     return hdf5.write_dataset(group, name, array, chunks)

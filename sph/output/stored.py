@@ -58,8 +58,8 @@ class Refused(Exception):
 def load(file: io.FileIO, version: int) -> tuple[dict[str, np.ndarray], dict[str, str]]:
     """Return the datasets and the text attributes of /Checkpoint. Raises Refused.
 
-    version: the newest format number that this version of sph reads. HDF5 reads through `file`, so it
-    takes no lock and opens no other file.
+    version: the newest format number that this version of sph reads. HDF5 reads through `file`, so
+    it takes no lock and opens no other file.
     """
     try:
         with h5py.File(file, "r") as opened:
@@ -131,7 +131,7 @@ def _axes(group: h5py.Group, version: int) -> tuple[dict[str, int], set[str]]:
 
 
 def fields_of(text: str) -> dict[str, tuple[int, bool]]:
-    """Return rank, and whether it may be missing, of each field named in `fields`. Raises Refused."""
+    """Return rank, and whether it may be missing, of each field in a JSON text."""
     try:
         found = {
             name: (int(rank), bool(remade)) for name, (rank, remade) in json.loads(text).items()

@@ -1,6 +1,6 @@
-"""Optional physics: one folder a part, which a scene has or leaves out (`sph.part`).
+"""Optional physics, one folder for each part (see `sph.part`).
 
-The folder's `__init__.py` defines one subclass of `Part`. Its keys appear in [physics].
+The `__init__.py` of a folder defines one subclass of `Part`, whose keys appear in [physics].
 """
 
 import functools
@@ -11,7 +11,7 @@ from sph.part import Part
 
 @functools.cache
 def classes(formulation: str) -> tuple[type[Part], ...]:
-    """The parts that can join that formulation, in the order of their names."""
+    """Return the parts that can be used with a formulation, in order of their names."""
     found = (
         registry.part_class("sph.parts", name) for name in registry.names("sph.parts", folders=True)
     )

@@ -16,7 +16,7 @@ TINY = 1e-300  # keeps 1/r finite where r_ij = 0 and what it multiplies is zero 
 
 
 class Neighbours(NamedTuple):
-    """Candidates of every block, complete within reach_factor list_support of its particles."""
+    """Candidates of all blocks, complete within reach_factor times list_support of particles."""
 
     lists: tuple
     images: tuple
@@ -25,7 +25,7 @@ class Neighbours(NamedTuple):
 
 
 class Sweep:
-    """What a pass runs over: the state, its neighbours, the models, and the step it is part of.
+    """The arguments of passes: the state, its neighbours, the models and the step.
 
     wanted (blocks,): for a pass that widens lists. Blocks where it is 0 are passed over; the pass
     sets it to 0, or to the multiple of list_support to which the block must be listed before it is
@@ -37,9 +37,9 @@ class Sweep:
         self.team = team
         self.dim = (0,) * state.dimension
         self.wanted = np.empty(blocks)
-        self.models = None  # of the formulation: at the start others than later
+        self.models = None  # of the formulation; different in the first passes
         self.neighbours: Neighbours | None = None
-        self.dt = 0.0  # of the step that is being made
+        self.dt = 0.0  # of the present step
 
     def run(self, function, models, *arguments) -> None:
         """Call function(first, last, dim, models, neighbours, *arguments) over ranges of blocks."""

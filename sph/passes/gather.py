@@ -1,4 +1,4 @@
-"""The gather: a candidate's values copied into scratch, images applied, by the rank of the field.
+"""Copying of candidates' values to scratch arrays, with images applied by the rank of the field.
 
 `sign` (K, D) and `offset` (K, D) are those of the images (`sph.domain`). A field or scratch that is
 None costs nothing. The loops run over len(dim), a constant to the compiler; over a shape they would
@@ -14,13 +14,13 @@ from sph.neighbours.lists import IMAGE_SHIFT
 
 @njit(**COMPILED, forceinline=True)
 def unpacked(packed):
-    """(particle, image) of a candidate in the lists."""
+    """Return (particle, image) of a candidate in the lists."""
     return packed & ((1 << IMAGE_SHIFT) - 1), packed >> IMAGE_SHIFT
 
 
 @njit(**COMPILED, forceinline=True)
 def most_candidates(first_block, last_block, count):
-    """The length that scratch needs for blocks [first_block, last_block)."""
+    """Return the length of scratch arrays for blocks [first_block, last_block)."""
     size = 0
     for block in range(first_block, last_block):
         size = max(size, count[block])
@@ -29,13 +29,13 @@ def most_candidates(first_block, last_block, count):
 
 @njit(**COMPILED, forceinline=True)
 def place_in(scratch, k, position, j, dim, sign, offset, image):
-    """scratch[:, k] = where the image of particle j is; position (D, N)."""
+    """Set scratch[:, k] to the position of an image of particle j; position: (D, N)."""
     for d in range(len(dim)):
         scratch[d, k] = sign[image, d] * position[d, j] + offset[image, d]
 
 
 def copy_in(scratch, k, field, j, dim, sign, image):
-    """scratch[..., k] = field[..., j], reflected as its rank tells: (N,), (D, N) or (D, D, N)."""
+    """Set scratch[..., k] to field[..., j], reflected by its rank: (N,), (D, N) or (D, D, N)."""
 
 
 @overload(copy_in, jit_options=INLINED)

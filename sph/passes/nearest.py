@@ -1,8 +1,8 @@
-"""The pass over distances to the nearest neighbour: it tells whether particles have paired.
+"""The pass for distances to the nearest neighbour, which show the pairing instability.
 
-A kernel whose Fourier transform turns negative pulls particles together in pairs where its support
-holds too many neighbours (Dehnen & Aly 2012, section 3). Sums over neighbours stay smooth, so no
-density shows it: only the distances do.
+With too many neighbours, particles form close pairs if the Fourier transform of the kernel has
+negative values (Dehnen & Aly 2012, section 3). Sums over neighbours stay smooth, so pairing shows
+only in the distances.
 """
 
 import numpy as np
@@ -15,10 +15,10 @@ from sph.passes.gather import most_candidates, place_in, unpacked
 
 @njit(**COMPILED)
 def nearest(first_block, last_block, dim, _, neighbours, position, support, mass, density, ratio):
-    """Write ratio (N,), distance to the nearest neighbour over (m/rho)^(1/D), over blocks.
+    """Write ratio (N,), distance to the nearest neighbour over (m/rho)^(1/D), for some blocks.
 
-    Images of all particles count, also those of the particle itself; position is (D, N), the
-    others (N,). inf where no neighbour lies within the support.
+    position: (D, N), other arrays (N,). Images of all particles count, including the particle's
+    own. inf if there is no neighbour within the support radius.
     """
     D = len(dim)
     start, count, candidates = neighbours.lists

@@ -30,7 +30,7 @@ class Problem(base.Problem):
     }
     limits: ClassVar = {
         "energy_drift": base.Limit(
-            1e-6, "gas at rest: heating is of second order in the small velocities"
+            1e-6, "gas at rest: du/dt is of second order in the small velocities"
         ),
         "mach_number": base.Limit(0.05, "velocities from pressure errors of a few per cent"),
         "pressure_error": base.Limit(

@@ -39,7 +39,7 @@ class Problem(base.Problem):
             1.0, "gas expands from rest at most at 2 c/(gamma - 1)"
         ),
         "kinetic_share_error": base.Limit(
-            0.002, "measured: 4e-4; viscous heating would delay the conversion to motion"
+            0.002, "measured: 4e-4; viscosity would delay the conversion to motion"
         ),
     }
 

@@ -235,7 +235,7 @@ class Problem(base.Problem):
         over exact, minus 1 (for velocity, relative to its change); shock_left_error and
         shock_right_error: distance that a shock has travelled relative to the gas ahead over exact,
         minus 1; contact_energy_excess: largest u between the outer waves over exact, minus 1, due
-        to heating at the start of the run.
+        to the start of the run.
         """
         exact = self.exact(eos, time, particles.position)
         if exact is None:

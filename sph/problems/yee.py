@@ -16,7 +16,7 @@ from sph.problems.support.vortex import from_centre, rotation
 
 _SHARED = base.Problem.model_fields
 
-STRENGTH = 5.0  # beta of the paper
+STRENGTH = 5.0  # beta of Yee et al.
 WIDTH = 10.0  # least width of the box; at its edge the rotation is 2.5e-5 of the sound speed
 
 

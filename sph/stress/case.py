@@ -25,7 +25,7 @@ from sph.errors import ConfigError, FileError
 from sph.problems.base import Section
 
 FOLDER = Path(__file__).parent / "cases"
-TABLES = ("problem", *SECTIONS)  # of the configuration in a case
+TABLES = ("problem", "physics", *SECTIONS)  # of the configuration in a case
 
 
 class Bound(Section):

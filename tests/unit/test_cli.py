@@ -124,7 +124,7 @@ def test_run_tells_the_summary_and_nothing_else_on_stdout(done):
     assert re.fullmatch(r"shock_tube: 61 particles to t = 0\.2 in \d+ steps \(done\)\.", lines[0])
     assert lines[1].startswith("Error (L1 against the exact solution, the whole domain): density ")
     assert any(line.startswith("Conserved, at worst over the run: energy to ") for line in lines)
-    assert any(line.startswith("Cost: ") and "compiling" in line for line in lines)
+    assert any(line.startswith("Cost: ") and "for compilation" in line for line in lines)
     assert lines[-1] == f"Results: {run} (`sph plot {run}` draws them)."
     assert "wrote checkpoint_000004.h5" in result.stderr
     assert "wrote" not in result.stdout
@@ -220,7 +220,7 @@ def test_restart_says_that_it_passes_over_a_damaged_checkpoint(done, tmp_path):
     result = sph_("restart", run)
     assert result.exit_code == 0
     assert (
-        "checkpoint_000004.h5 is passed over (cannot be read): going on from checkpoint_000003"
+        "checkpoint_000004.h5 is skipped (it cannot be read): continuing from checkpoint_000003"
         in result.stderr
     )
     assert hashes(run) == hashes(done[0])
@@ -385,7 +385,7 @@ def test_what_is_no_good_checkpoint(done, tmp_path):
     bad.write_bytes(good)
     with h5py.File(bad, "a") as file:
         file["Checkpoint"].attrs["format_version"] = 99
-    assert_told(sph_("restart", bad), 4, "a newer format (99)", "Try: a newer sph")
+    assert_told(sph_("restart", bad), 4, "a newer format (99)", "Try: a newer version")
     bad.write_bytes(good)
     assert_told(sph_("restart", bad), 4, "not in a run directory", "-o DIR")
 
@@ -426,7 +426,7 @@ def test_a_signal_in_a_run_leaves_a_checkpoint(number, config, tmp_path):
     code, out, err = finished(process)
     assert (code, out) == (75, "")
     assert "stopped by " + {2: "Ctrl-C", 15: "SIGTERM"}[number] in err
-    assert "`sph restart run` goes on from there" in err
+    assert "`sph restart run` continues the run" in err
     assert "Traceback" not in err
     summary = json.loads((tmp_path / "run" / "summary.json").read_text())
     assert summary["status"] == "stopped"
@@ -466,7 +466,7 @@ def test_a_stop_while_compiling_and_a_restart_equal_a_run_without(config, tmp_pa
     assert code == 0, err
     code, out, err = finished(started(tmp_path, "run", config, "-o", "other", **cache))
     assert code == 0, err
-    assert "of which 0 s compiling" in out  # else this shows nothing
+    assert "and 0 CPU s for compilation" in out  # else this shows nothing
     assert "compiling the code" not in err
     found = hashes(tmp_path / "stopped")
     assert len(found) == 5

@@ -84,7 +84,7 @@ def test_python_without_docstrings_says_the_same(command):
 def test_docstrings():
     assert docstring(sys.modules[__name__]) == __doc__
     assert docstring(python) == ""
-    assert docstring(docstring).startswith("The docstring of a module, class or function")
+    assert docstring(docstring).startswith("Return the docstring of a module, class or function")
 
 
 @pytest.mark.parametrize("missing", ["fcntl", "resource"])

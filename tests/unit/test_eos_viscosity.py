@@ -7,9 +7,9 @@ from numba import njit
 from sph import eos, registry
 from sph.compiled import COMPILED
 from sph.formulations.gas import terms
-from sph.parts.conductivity.contacts import share
+from sph.parts.conductivity._contacts import share
 from sph.parts.viscosity import balsara, constant
-from sph.parts.viscosity.shocks import alpha_after
+from sph.parts.viscosity._shocks import alpha_after
 from sph.parts.viscosity.switches import cullen_dehnen, morris_monaghan
 
 FEW_ROUNDINGS = 1e-14  # of some operations at 1e-16 each

@@ -52,7 +52,7 @@ class Strict(Part):
 
 def test_what_sets_a_step_is_its_particle_and_criterion():
     words = {
-        "signal_speed": "by the speed of its signals",
+        "signal_speed": "(signal speed)",
         "energy": "u/|du/dt|",
         "acceleration": "acceleration",
         "support": "support",
@@ -72,7 +72,7 @@ def test_what_sets_a_step_is_its_particle_and_criterion():
         return faults.what_sets(simulation)
 
     for criterion, expected in words.items():
-        assert said(criterion).startswith("particle 8 sets it by ")
+        assert said(criterion).startswith("limited by particle 8 (")
         assert expected in said(criterion)
         # no other criterion is told in these words
         assert sum(expected in said(one) for one in words) == 1
@@ -119,7 +119,7 @@ def test_a_sum_that_is_not_finite_is_told_with_the_particle_of_the_most(
         setattr(simulation.totals, total, np.inf)
     error = faults.endless_sum(simulation)
     assert error.particle == particle
-    assert f"the total {name} " in str(error)
+    assert f"total {name} is not finite" in str(error)
     assert f"particle {particle} at (" in str(error)
     assert ("softening" in str(error)) == (total == "potential_energy")
     if total != "potential_energy":  # nor is it asked for where there is no field
@@ -156,6 +156,6 @@ def test_particles_in_one_place_are_counted_with_their_images(boundary, images):
     error = faults.crowded(crowd)
     assert error.particle == 12
     others = 1 + 2 * images
-    assert f"particle 12 at (0, 0.25): {others} other(s) in the same place" in str(error)
+    assert f"particle 12 at (0, 0.25): {others} other particle(s) or images" in str(error)
     alone = state(boundary=boundary, density=density)
-    assert "alone it outweighs" in str(faults.crowded(alone))
+    assert "the particle alone has" in str(faults.crowded(alone))

@@ -112,9 +112,9 @@ def test_stacks_on_either_side_continue_one_another():
 
 def test_lattice_of_another_dimension_is_refused_with_what_to_take():
     for kind, dimension in (("hexagonal", 3), ("hexagonal", 1), ("bcc", 2), ("bcc", 1)):
-        with pytest.raises(ValueError, match=r'take "cubic"'):
+        with pytest.raises(ValueError, match=r'expected "cubic"'):
             lattice.fill(np.array([[0.0, 1.0]] * dimension), 100, kind)
-    with pytest.raises(ValueError, match='no lattice "fcc"'):
+    with pytest.raises(ValueError, match='lattice "fcc": expected'):
         lattice.unit_cell("fcc", 3)
 
 

@@ -273,7 +273,7 @@ def test_supports_and_numbers_that_cannot_be_served_are_refused(monkeypatch):
         search_over(("periodic",), position, np.full(10, 600.0), 0.1)
     monkeypatch.setattr(lists, "MAX_PARTICLES", 9)
     search = Search(Domain(np.array([[0.0, 1.0]]), ("open",)), Team(1))
-    with pytest.raises(NumericalError, match="10 particles are more than the 9"):
+    with pytest.raises(NumericalError, match="10 particles: expected at most 9"):
         search.order(position, np.arange(10))
 
 

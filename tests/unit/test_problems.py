@@ -565,7 +565,7 @@ def test_smooth_layers_follow_the_published_profile():
     assert state.mass.size == 128**2
     pressure = MONATOMIC.pressure(density, state.internal_energy)
     np.testing.assert_allclose(pressure, 2.5, rtol=1e-14)
-    # the profiles as the paper writes them, branch by branch
+    # the profiles as McNally et al. write them, branch by branch
     mean_rho, mean_v, ramp = -0.5, 0.5, 0.025
     below = np.exp((y - 0.25) / ramp)
     above = np.exp((0.25 - y) / ramp)

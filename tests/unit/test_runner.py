@@ -458,9 +458,9 @@ def test_a_damaged_last_checkpoint_is_passed_over_and_named(tube, tmp_path):
     assert [
         note
         for note in progress.notes
-        if "checkpoint_000004.h5 is passed over (cannot be read)" in note
+        if "checkpoint_000004.h5 is skipped (it cannot be read)" in note
     ]
-    assert [note for note in progress.notes if "going on from checkpoint_000003.h5" in note]
+    assert [note for note in progress.notes if "continuing from checkpoint_000003.h5" in note]
     assert_same_from(-1, run, tube)
 
 
@@ -547,7 +547,8 @@ def test_particles_held_are_told_at_the_start_and_counted_in_every_step(tmp_path
     watch = Watch()
     run = start(ALONE, tmp_path / "run", watch)
     said = (
-        "1 particle(s) have too few neighbours: their supports are held at 1 (physics.max_support)"
+        "1 particle(s) have too few neighbours: their support radius is limited to 1 "
+        "(physics.max_support)"
     )
     assert said in watch.notes
     assert {row["held_supports"] for row in rows(run)} == {"1"}
@@ -731,7 +732,7 @@ def test_a_numerical_failure_names_the_particle_and_the_way_on(tmp_path, recwarn
     assert caught.value.exit_code == 3
     for words in ("energy has drifted by", "Try: a smaller physics.C", str(run.checkpoint_path(0))):
         assert words in text
-    offender = re.search(r"particle (\d+) holds the most", text)[1]
+    offender = re.search(r"particle (\d+) has most energy", text)[1]
     assert checkpoints.read(run.offenders).particles.id[0] == int(offender)
     assert f"{run.offenders}" in text
     assert len(text.splitlines()) <= 24  # one screen
@@ -741,7 +742,7 @@ def test_a_numerical_failure_names_the_particle_and_the_way_on(tmp_path, recwarn
     assert f"particle {offender}" in summary["reason"]
     assert len(rows(run)) == 1
     assert [str(warning.message) for warning in recwarn] == []
-    with pytest.raises(FileError, match=r"no going on from it\.\nTry: the run's last good"):
+    with pytest.raises(FileError, match=r"it cannot be restarted\.\nTry: the last valid"):
         go_on(run.offenders, into=tmp_path / "part")
     go_on(run.checkpoint_path(0), "physics.max_energy_drift=0.02")
     assert json.loads(run.summary.read_text())["status"] == "done"
@@ -817,7 +818,7 @@ def test_a_failure_of_the_first_evaluation_leaves_the_place_where_it_was(tmp_pat
     run = RunDirectory.create(tmp_path / "run")
     with pytest.raises(NumericalError, match=r"particle .*support.*\nTry: ") as caught:
         runner.run(configuration.from_text(few), run, Watch())
-    assert "last good checkpoint" not in str(caught.value)
+    assert "last valid checkpoint" not in str(caught.value)
     left = checkpoints.read(run.offenders)
     assert left.particles.id[0] == caught.value.particle
     assert left.config.problem == configuration.from_text(few).problem
@@ -883,7 +884,7 @@ def test_summary(uninterrupted):
     assert any(config.physics.scheme in part for part in summary["compiled_in"])
     switched = not isinstance(config.physics.alpha, float)
     assert any("alpha" in part for part in summary["compiled_in"]) == switched
-    assert any("alpha" in part for part in summary["left_out"]) != switched
+    assert any("alpha" in part.split(":")[0] for part in summary["left_out"]) != switched
 
 
 def test_seconds_by_phase_add_up(uninterrupted):

@@ -254,7 +254,7 @@ def test_a_bad_particle_is_named(begin, name, value):
 
 
 def test_a_support_that_does_not_fit_the_box_is_refused_at_the_start(begin):
-    with pytest.raises(NumericalError, match=r"particle \d+ needs a kernel support of .* times"):
+    with pytest.raises(NumericalError, match=r"particle \d+ needs a support radius of .* times"):
         begin(TUBE, "problem.boundary=periodic", "physics.eta=5e4")
 
 

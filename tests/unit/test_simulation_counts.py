@@ -15,8 +15,8 @@ from sph.integrators import leapfrog, step_size
 from sph.integrators.step_size import StepLimit
 from sph.neighbours.order import BLOCK
 from sph.neighbours.search import Origin
-from sph.parts.conductivity.contacts import contacts
-from sph.parts.viscosity.shocks import shocks
+from sph.parts.conductivity._contacts import contacts
+from sph.parts.viscosity._shocks import shocks
 from sph.scene import Scene
 from sph.simulation import Simulation
 from sph.totals import Baseline, Budget

@@ -128,12 +128,12 @@ def test_large_alpha_and_large_courant_numbers_are_held(begin, monkeypatch, stif
         (("physics.alpha=3.0",), "a smaller physics.alpha", "larger physics.alpha"),
         (
             ("physics.alpha=8.0",),
-            "physics.C below 0.0616, at which physics.alpha holds it already",
+            "physics.C below 0.0616, to which physics.alpha already reduces it",
             "larger physics.alpha",
         ),
         (
             ("physics.alpha=0.0", "physics.C=3.0"),
-            "physics.C below 0.5, at which the stability of the leapfrog holds it already",
+            "physics.C below 0.5, to which the stability of the leapfrog already reduces it",
             "smaller physics.alpha",
         ),
         (
@@ -160,7 +160,7 @@ def test_what_to_try_can_help(begin, settings, words, not_words):
         ("energy", (), "physics.energy_limit = false"),
         ("signal_speed", (), "a restart from an earlier checkpoint with a smaller physics.C"),
         ("signal_speed", ("physics.C=1e-5",), "a larger physics.C"),
-        ("viscosity", ("physics.alpha=16.0",), "less of what sets it: physics.alpha"),
+        ("viscosity", ("physics.alpha=16.0",), "a smaller value of physics.alpha"),
     ],
 )
 def test_what_to_try_where_steps_are_too_short_is_not_shorter_ones(
@@ -187,7 +187,7 @@ def test_every_criterion_has_words():
     assert len(scene.parts) == len(parts.classes("gas"))
     for criterion in (*step_size.CRITERIA, *(part.name for part in scene.parts)):
         particle = 0 if criterion in ("growth", "end") else 7
-        assert ("particle 7 sets it by" in words(particle, criterion)) == (particle == 7)
+        assert ("by particle 7" in words(particle, criterion)) == (particle == 7)
     assert "checkpoint" in words(0, "checkpoint")
     assert "box" in words(0, "approach")
 
@@ -273,7 +273,7 @@ def test_a_particle_lost_from_an_open_domain(begin, monkeypatch, inside, outside
     p.position[:, 3] = 500.0, inside
     simulation.watchdog.check(simulation)
     p.position[1, 3] = outside
-    with pytest.raises(NumericalError, match=f"is lost: its y = {outside:g} ") as caught:
+    with pytest.raises(NumericalError, match=f"is at y = {outside:g}, outside") as caught:
         simulation.watchdog.check(simulation)
     assert caught.value.particle == p.id[3]
     monkeypatch.setattr(watchdog.Watchdog, "_check_fences", lambda *_: None)
@@ -293,7 +293,7 @@ def test_a_step_that_collapses(begin, monkeypatch):
         return limit._replace(dt=1e-9 * limit.dt)
 
     monkeypatch.setattr(step_size, "limit", shrunk)
-    with pytest.raises(NumericalError, match=r"time step has collapsed to .* sets it by"):
+    with pytest.raises(NumericalError, match=r"time step has collapsed to .*, limited by particle"):
         run(simulation, math.inf)
     assert simulation.step < 25 + 41  # within two windows
     monkeypatch.setattr(watchdog.Watchdog, "_check_pace", lambda *_: None)
@@ -319,7 +319,7 @@ def test_a_pace_is_compared_with_the_best_there_was(begin):
     simulation = begin()
     after_windows(simulation, 1e-9, 2e-9, 1e-9)  # slow from the start
     after_windows(simulation, 1.0, 1e-3, 2e-6)
-    with pytest.raises(NumericalError, match=r"collapsed to 0\.001: it may not grow faster"):
+    with pytest.raises(NumericalError, match=r"collapsed to 0\.001, limited by the largest growth"):
         after_windows(simulation, 1.0, 1e-4, 1e-8)
 
 
@@ -328,7 +328,9 @@ def test_a_step_too_small_to_move_time(begin, monkeypatch):
     simulation.advance(math.inf)
     allowed = step_size.limit
     monkeypatch.setattr(step_size, "limit", lambda *a: allowed(*a)._replace(dt=1e-30))
-    with pytest.raises(NumericalError, match=r"fell to 1e-30.* sets it by the speed of its"):
+    with pytest.raises(
+        NumericalError, match=r"fell to 1e-30.* limited by particle .*\(signal speed\)"
+    ):
         simulation.advance(math.inf)
     monkeypatch.setattr(watchdog.Watchdog, "_check_numbers", lambda *_: None)
     time = simulation.time
@@ -419,7 +421,7 @@ LIQUID = "physics.eos={ name = 'stiffened_gas', gamma = 4.4, p_inf = 1.0 }"
 
 def test_a_liquid_torn_apart_is_named_and_not_an_ideal_gas(begin):
     # at a free end the density sum finds half of the neighbours: a tension of 0.4 x 4.4 p_inf
-    with pytest.raises(NumericalError, match="particle 61 is pulled apart") as error:
+    with pytest.raises(NumericalError, match="particle 61 is under more tension") as error:
         begin(LIQUID, boundary="open")
     assert error.value.particle == 61
     run(begin(LIQUID))
@@ -452,13 +454,13 @@ end = 0.1
         ("problem.masses=[1.0,1.0,1e-150,1.0]", "mass of particle 3 .* 1e-150"),
         ("problem.internal_energies=1e300", "internal energy of particle 1"),
         ("problem.positions=[[-0.3],[0.0],[0.1],[-1e200]]", "position of particle 4"),
-        ("problem.domain=[-1e200,1e200]", r"domain is 2e\+200 long in x"),
-        ("problem.domain=[-1e-200,1e-200]", "domain is 2e-200 long in x"),
+        ("problem.domain=[-1e200,1e200]", r"along x is 2e\+200"),
+        ("problem.domain=[-1e-200,1e-200]", "along x is 2e-200"),
         ("time.end=1e-320", r"time\.end is 9\.99989e-321"),
     ],
 )
 def test_what_no_sum_can_hold_is_named_before_the_first(begin, override, words):
-    with pytest.raises(NumericalError, match=words + r"[\s\S]*Try: code units"):
+    with pytest.raises(NumericalError, match=words + r"[\s\S]*Try: other code units"):
         begin(override, text=CLOUD)
 
 
@@ -503,14 +505,14 @@ def test_a_sum_beyond_numbers_is_told_from_a_step_too_small(begin, key, words):
     simulation.particles.mass[7] = 1e3
     with (
         np.errstate(all="ignore"),
-        pytest.raises(NumericalError, match=f"the total {words} energy"),
+        pytest.raises(NumericalError, match=f"total {words} energy is not"),
     ):
         simulation._measure(past=None)
 
 
 def test_a_run_that_will_not_come_to_its_end(begin, monkeypatch):
     monkeypatch.setattr(watchdog, "WINDOW", 20)
-    with pytest.raises(NumericalError, match="will not come to its end"):
+    with pytest.raises(NumericalError, match="cannot reach"):
         run(begin("physics.C=1e-17"))
     monkeypatch.setattr(watchdog.Watchdog, "_check_pace", lambda *_: None)
     simulation = begin("physics.C=1e-17")
@@ -521,5 +523,5 @@ def test_a_run_that_will_not_come_to_its_end(begin, monkeypatch):
 
 def test_without_a_look_at_the_range_words_are_of_what_is_not_wrong(begin, monkeypatch):
     monkeypatch.setattr(watchdog.Watchdog, "check_range", lambda *_: None)
-    with pytest.raises(NumericalError, match="acceleration of particle"):
+    with pytest.raises(NumericalError, match="no support radius contains enough neighbours"):
         begin("problem.velocities=[[0.0],[1e155],[0.0],[0.0]]", text=CLOUD)

@@ -1,6 +1,5 @@
 """Every bound of the watchdog from both sides, on a state made by hand."""
 
-import re
 from types import SimpleNamespace
 
 import numpy as np
@@ -80,7 +79,7 @@ def test_boxes_and_ends_that_are_refused_by_their_size(size, is_wrong):
     tall, late = quiet(), quiet()
     tall.scene.domain.box = np.array([[0.0, 1.0], [0.0, size]])
     late.scene.config.time.end = size
-    for state, words in ((tall, "long in y"), (late, "time.end")):
+    for state, words in ((tall, "along y is"), (late, "time.end")):
         error = refusal(state, "check_range")
         assert (error is not None) == is_wrong
         assert error is None or words in str(error)
@@ -91,7 +90,7 @@ def test_boxes_and_ends_that_are_refused_by_their_size(size, is_wrong):
 def test_a_sum_that_is_not_finite_is_seen_though_every_particle_is(name, value):
     state = quiet()
     setattr(state.totals, name, value)
-    assert re.search(r"the total .* is not finite", str(refusal(state)))
+    assert "is not finite" in str(refusal(state))
 
 
 @pytest.mark.parametrize("dt", [np.nan, np.inf, 0.0, -1.0])
@@ -180,7 +179,7 @@ def test_a_lost_particle_is_a_hundred_lengths_away_on_either_side(y, is_lost):
         ((1e-3, 1.0, 1e-3, 1.1e-6), None),
         # of 0.25, all of which are left, and of 0.15
         ((0.26e-12,), None),
-        ((0.24e-12,), "will not come to its end"),
+        ((0.24e-12,), "cannot reach"),
         ((0.1, 0.16e-12), "collapsed"),
     ],
 )
@@ -211,7 +210,7 @@ def test_what_is_left_is_counted_from_now():
     dog = watchdog.Watchdog(late.scene)
     dog._check_pace(late)
     late.step, late.time = late.step + watchdog.WINDOW, 0.2e-12
-    with pytest.raises(NumericalError, match="not come to its end"):
+    with pytest.raises(NumericalError, match="cannot reach"):
         dog._check_pace(late)
 
 
@@ -225,5 +224,5 @@ def test_a_window_begins_where_the_last_one_ended(step, is_looked_at):
     if not is_looked_at:
         dog._check_pace(state)
         return
-    with pytest.raises(NumericalError, match="not come to its end"):
+    with pytest.raises(NumericalError, match="cannot reach"):
         dog._check_pace(state)

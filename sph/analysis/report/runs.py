@@ -81,7 +81,7 @@ class Row:
         return names
 
     def value(self, key: str) -> str:
-        """The value of a setting as it is shown."""
+        """The value of a setting, as tables show it."""
         if key not in self.settings:
             return "–"
         found = self.settings[key]
@@ -92,9 +92,9 @@ class Row:
 
 
 def read(sources: Sequence[Path]) -> list[Row]:
-    """The runs that are or lie in these directories. Raises FileError where there are none.
+    """The runs in these directories, which may be run directories. Raises FileError without runs.
 
-    Of more than one sweep, each row has the name of its own.
+    Rows have the name of their sweep where there is more than one.
     """
     rows: dict[Path, Row] = {}
     sources = list(dict.fromkeys(map(Path, sources)))
@@ -116,7 +116,7 @@ def read(sources: Sequence[Path]) -> list[Row]:
 
 
 def varied_keys(rows: Sequence[Row]) -> list[str]:
-    """Keys whose values differ, but for what only goes with problem.name, such as its own keys."""
+    """Keys whose values differ, without keys that differ only because the problem does."""
     keys = dict.fromkeys(key for row in rows for key in row.settings)
     by_problem: dict[str, Row] = {}
     for row in rows:
@@ -133,7 +133,7 @@ def varied_keys(rows: Sequence[Row]) -> list[str]:
 
 
 def _shorten_models(rows: Sequence[Row]) -> None:
-    """Leave a model's parameters out of the settings where no other run has others for it."""
+    """Leave the parameters of a model out of the settings where all runs agree in them."""
     models: dict[tuple[str, str], list[Row]] = {}
     for row in rows:
         for key, value in row.settings.items():
@@ -146,7 +146,7 @@ def _shorten_models(rows: Sequence[Row]) -> None:
 
 
 def _runs_in(directory: Path) -> list[Path]:
-    """`directory` if it is a run, else those in it, in the order a reader would count."""
+    """`directory` if it is a run, else the runs in it, in natural order (9 before 10)."""
     if _is_run(directory):
         return [directory]
     if not directory.is_dir():
@@ -184,7 +184,7 @@ def _row(path: Path) -> Row:
 
 
 def _never_begun(sweep: SweepDirectory) -> dict[Path, Row]:
-    """Points of a sweep without a run: those that failed before they had one, and the rest."""
+    """Points of a sweep without a run directory: they failed at once, or have not started."""
     failures = sweep.failures()
     rows = {}
     for point in sweep.plan().points:
@@ -192,7 +192,7 @@ def _never_begun(sweep: SweepDirectory) -> dict[Path, Row]:
         if not _is_run(path):
             reason = failures.get(point.name)
             status = "unfinished" if reason is None else "failed"
-            rows[path] = Row(path, point.name, {}, None, status, reason or "it was not begun")
+            rows[path] = Row(path, point.name, {}, None, status, reason or "not started")
     return rows
 
 
@@ -207,7 +207,7 @@ def _cost(summary: Summary) -> dict[str, float]:
 
 
 def _number(value: Any) -> float | None:
-    """Its size if it is a positive finite number: nothing else has a place on a log scale."""
+    """The modulus of a finite number other than 0; None for all else: axes are logarithmic."""
     is_number = isinstance(value, int | float) and not isinstance(value, bool)
     if not is_number or not math.isfinite(value):
         return None

@@ -14,7 +14,7 @@ NORMS = ("L1", "L2", "Linf")
 
 
 def as_text(report: Report) -> str:
-    """Columns in line, for a terminal."""
+    """The table with aligned columns, for a terminal."""
     header, *lines = _cells(report)
     widths = [max(map(len, column)) for column in zip(header, *lines, strict=True)]
     return "\n".join(
@@ -24,7 +24,7 @@ def as_text(report: Report) -> str:
 
 
 def as_markdown(report: Report, sentences: Sequence[str], pictures: Sequence[str]) -> str:
-    """The table, the words, and the pictures that lie beside it."""
+    """The table, the sentences, and links to the figures in the same directory."""
     header, *lines = _cells(report)
     rule = ["---:"] * len(header)
     rows = ["| " + " | ".join(line) + " |" for line in (header, rule, *lines)]
@@ -35,7 +35,7 @@ def as_markdown(report: Report, sentences: Sequence[str], pictures: Sequence[str
 
 
 def as_csv(report: Report) -> str:
-    """A line a run, with all norms of all fields and all figures of its summary."""
+    """One line for each run: all norms of all fields, and all figures of its summary."""
     records = _records(report)
     columns = dict.fromkeys(name for record in records for name in record)
     text = io.StringIO()
@@ -46,7 +46,7 @@ def as_csv(report: Report) -> str:
 
 
 def as_json(report: Report, sentences: Sequence[str]) -> str:
-    """The question, the runs, the lines with their fits, and the words."""
+    """The question, the runs, the series with their fits, and the sentences."""
     runs = [row.name for row in report.rows]
     reference = report.question.reference
     series = [
@@ -70,7 +70,7 @@ def as_json(report: Report, sentences: Sequence[str]) -> str:
 
 
 def _cells(report: Report) -> list[list[str]]:
-    """Header and lines of what is shown."""
+    """The header and the lines of the table."""
     shown = [key for key in report.keys if key != RESOLUTION]
     question = report.question
     several = len({line.sweep for line in report.series}) > 1
@@ -92,7 +92,7 @@ def _cells(report: Report) -> list[list[str]]:
 
 
 def _records(report: Report) -> list[dict]:
-    """All there is of every run, also of those without an error, by column."""
+    """All figures of every run, also of runs without an error, by column."""
     found = zip(
         report.error.tolist(), report.excess.tolist(), report.on_front.tolist(), strict=True
     )

@@ -1,4 +1,4 @@
-"""What a report says in sentences."""
+"""The findings of a report, in sentences."""
 
 from pathlib import Path
 
@@ -7,12 +7,12 @@ import numpy as np
 from sph.analysis.report.compare import COSTS, Report, Series
 from sph.analysis.report.runs import Row
 
-# CPU times of equal runs differ by some per cent, more on a machine that is shared.
+# CPU times of equal runs differ by a few per cent, more on a shared machine.
 LEVEL = 1.1
 
 
 def sentences(report: Report) -> list[str]:
-    """How errors fall, what is on the front, what is dominated by how much, and what to know."""
+    """Orders of convergence, the Pareto front, the distance of other lines from it, and caveats."""
     said = [_costs(report)]
     if report.rows:
         said += [_order(line) for line in report.series if line.order is not None]
@@ -50,7 +50,7 @@ def _front(report: Report) -> str:
 
 
 def _standing(report: Report, line: Series) -> str:
-    """How far a line is from the front where it is not on it."""
+    """The cost of a line over the cost of the front, where the line is not on it."""
     off = [i for i in line.members if not report.on_front[i]]
     factors = report.excess[off]
     never = len(off) == len(line.members)
@@ -79,21 +79,21 @@ def _warnings(report: Report) -> list[str]:
         )
     for row in (*report.rows, *report.without):
         if row.summary and (changed := row.summary["settings_changed"]):
-            said.append(f"{row.name} changed its settings on the way: {'; '.join(changed)}.")
+            said.append(f"{row.name} changed its settings in restarts: {'; '.join(changed)}.")
     truths = dict.fromkeys(row.truth for row in report.rows)
     if len(truths) > 1 and "." not in report.question.field:
         told = (f"the run {Path(one).name}" if one else "the exact solution" for one in truths)
-        said.append(f"Errors are not all against the same: some are against {', '.join(told)}.")
+        said.append(f"Errors differ in what they are against: {', '.join(told)}.")
     different = [key for key in ("problem.name", "problem.dimension", "time.end")
                  if key in report.keys]  # fmt: skip
     if different:
-        said.append(f"These are different tasks ({', '.join(different)}): one front for all is "
-                    "to be read with care.")  # fmt: skip
+        said.append(f"The runs differ in {', '.join(different)}: compare their costs with "
+                    "care.")  # fmt: skip
     return said
 
 
 def _name(line: Series) -> str:
-    """Its label, with its sweep unless that is named like what it varies."""
+    """The label of a line, with its sweep unless the label says it."""
     sweep = "" if line.label.startswith(f"{line.sweep} = ") else line.sweep
     return ": ".join(filter(None, [sweep, line.label])) or "These runs"
 

@@ -1,4 +1,4 @@
-"""Grad-h SPH of a gas: density from neighbours, pair forces, artificial viscosity (docs/equations.md)."""
+"""Grad-h SPH of a gas: density from neighbours, pair forces, artificial viscosity."""
 
 from typing import Literal, NamedTuple
 
@@ -17,14 +17,14 @@ from sph.state import COMMON, Field
 
 SCHEMES = "sph.formulations.gas.schemes"
 
-# Relative tolerance of the converged support: round-off of the density sum is some 1e-14.
+# Relative tolerance of a converged support radius; round-off of the density sum is about 1e-14.
 TOLERANCE = 1e-10
 
 FIELDS = (*COMMON, Field("omega"))
 
 
 class Models(NamedTuple):
-    """What the formulas are made of; the types decide what is compiled, the values do not."""
+    """The models in the formulas. Their types, not their values, determine the compiled code."""
 
     scheme: tuple
     kernel: tuple
@@ -36,7 +36,7 @@ class Models(NamedTuple):
     balsara: tuple | None
     support_ratio: float  # H/h of the kernel
     eta: float
-    max_support: float  # H is held there where it has no root within; inf: nowhere
+    max_support: float  # upper limit of H, for particles without a root below; inf: none
 
 
 class Gas(Formulation):
@@ -53,8 +53,8 @@ class Gas(Formulation):
         Key(
             "density",
             'density estimate of a particle: "mass" sums m_j W over its neighbours; "number" sums '
-            "W and multiplies by its own mass, which is better for unequal masses and identical for "
-            "equal ones",
+            "W and multiplies by its own mass, which is better for unequal masses and identical "
+            "for equal ones",
             kind=Literal["mass", "number"],
             default="mass",
         ),
@@ -82,7 +82,7 @@ class Gas(Formulation):
         self.evolves_alpha = not terms["viscosity"].finds_shocks
         self.bounds_acceleration = (
             physics.density == "number"
-        )  # heavy gas beside light sends no signal
+        )  # the signal speed does not contain unequal masses
         sums = self.scheme.sums_pressure
         self.fields = (*FIELDS, Field("pressure_term", stored=False))
         if sums or self.exchanges:
@@ -128,7 +128,7 @@ class Gas(Formulation):
         )
 
     def _passes(self, scene) -> tuple[Pass, ...]:
-        """The two passes, with the fields that this scene has."""
+        """Return the two passes, with the fields that this scene has."""
         declared = {field.name for part in (self, *scene.parts) for field in part.fields}
 
         def of(*names):
@@ -160,7 +160,7 @@ class Gas(Formulation):
         )  # fmt: skip
 
     def _density(self, sweep) -> None:
-        """Steps 2-4 and 6: density, support, Omega, div and curl, and what follows from them."""
+        """Do steps 2-4 and 6: density, support, Omega, div v, curl v, and what follows."""
         s = sweep.state
         sweep.run(
             density, sweep.models, s.position, s.predicted_velocity, s.mass, s.predicted_energy,
@@ -168,11 +168,11 @@ class Gas(Formulation):
             s.get("pressure"), s.get("energy_shift"), s.get("div_v"), s.get("curl_v"),
             s.pressure_term, s.sound_speed, s.get("balsara"), s.get("alpha_rate"), sweep.wanted,
         )  # fmt: skip
-        if not sweep.wanted.max() > 0.0:  # else the supports that it began with serve once more
+        if not sweep.wanted.max() > 0.0:  # otherwise the pass is repeated from the old supports
             s.support, s.support_before = s.support_before, s.support
 
     def _rates(self, sweep) -> None:
-        """Step 5: acceleration, rate of energy, and each particle's signal speed."""
+        """Do step 5: acceleration, du/dt, and the signal speed of each particle."""
         s = sweep.state
         alpha = s.get("predicted_alpha")
         sweep.run(
@@ -213,7 +213,7 @@ class Gas(Formulation):
         return inside, [(sums, f"{self.scheme.name} takes it from density")]
 
     def check(self, simulation):
-        """Gas that is torn apart: where sound has no speed, forces and steps make no sense."""
+        """Raise NumericalError if the sound speed of a particle is not real, under tension."""
         if self.eos.lowest_energy is None:
             return
         p = simulation.particles
@@ -223,9 +223,9 @@ class Gas(Formulation):
         i = int(np.nanargmin(above))
         raise faults.fault(
             simulation,
-            f"particle {p.id[i]} is pulled apart by more than its equation of state holds: its "
-            f"density is {p.density[i]:.6g}, its internal energy {p.internal_energy[i]:.6g}",
-            "a boundary other than open, where the density sum misses neighbours; a weaker "
-            "rarefaction; more particles",
+            f"particle {p.id[i]} is under more tension than its equation of state allows: "
+            f"density {p.density[i]:.6g}, internal energy {p.internal_energy[i]:.6g}",
+            "a weaker rarefaction, more particles, or a boundary other than open, at which the "
+            "density sum lacks neighbours",
             int(p.id[i]),
         )

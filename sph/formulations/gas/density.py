@@ -21,8 +21,8 @@ def density(
     """Density pass over blocks [first_block, last_block), and what follows from it.
 
     wanted (blocks,): see `sph.passes.Sweep`. A particle whose support was not found gets a density
-    of -1. None leave out: pressure (nothing needs it), energy_shift (no scheme that sums it), div_v,
-    curl_v, balsara, alpha and alpha_rate.
+    of -1. None leave out: pressure (nothing needs it), energy_shift (no scheme that sums it),
+    div_v, curl_v, balsara, alpha and alpha_rate.
     """
     D = len(dim)
     kernel, weighting = models.kernel, models.weighting

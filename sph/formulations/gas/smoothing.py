@@ -1,10 +1,10 @@
-"""How each particle's support H and density are found from its neighbours (step 2).
+"""Support radius H and density of a particle from its neighbours (step 2).
 
-Both ways work on one particle's distances r[:nc] and weights m[:nc] (by default masses, see
-`weighting`) of its candidates, and return (H for what follows, rho or the sum in its place, Omega,
-wanted): `wanted` is 0.0, or, where H came to exceed `reach`, the radius within which the candidates
-are complete, the radius to list them to before trying again. Where there is no root up to `largest`
-H is held there and, as it does not follow the density then, Omega is 1.
+Both methods use distances r[:nc] and weights m[:nc] (by default masses, see `weighting`) of the
+candidates of a particle. They return (H, rho or the sum that replaces it, Omega, wanted). `wanted`
+is 0.0 or, if H exceeds `reach`, up to which the candidates are complete, the radius that the lists
+must reach before the next attempt. If there is no root up to `largest`, H is `largest` and Omega is
+1, since H does not depend on the density.
 """
 
 from typing import NamedTuple
@@ -14,14 +14,14 @@ from numba import njit
 from sph.compiled import COMPILED, verb
 from sph.kernels import dw_over_q, normalisation, w
 
-# The passes of eqs 7 and 15 approach their common root by a factor 1 - Omega each: where a flow is
-# resolved they end within a percent of it. Where Omega exceeds 2, at a jump of mass or density
-# between neighbours, they lead away from it for good. From this change of H on, relative, in the
-# last pass a particle's support is solved for instead.
+# Each pass of eqs 7 and 15 multiplies the distance from their common root by 1 - Omega. In resolved
+# flow this converges to within one per cent. It diverges if Omega exceeds 2, at jumps of mass or
+# density between neighbours. If the last pass changes H by more than this fraction, the root is
+# solved for instead.
 UNSETTLED = 0.05
 
-# In logarithms the sum of masses is nearly straight: Newton needs 3 or 4 iterations from a guess
-# within a factor 2, and bisection from there to 1e-10 at most 40 more.
+# The logarithm of the sum of masses is nearly linear in that of H: Newton's iteration needs 3 or 4
+# steps from a guess within a factor 2, and bisection to 1e-10 at most 40 more.
 MAX_ITERATIONS = 100
 
 
@@ -31,7 +31,7 @@ def find_support(self, kernel, dim, r, m, nc, mass, H, ratio, reach, largest):
 
 
 class FixedPasses(NamedTuple):
-    """Evaluate eqs 7, 8 and 15 `count` times, or solve them where that does not settle."""
+    """Evaluate eqs 7, 8 and 15 `count` times, or solve them if that does not converge."""
 
     count: int
     tolerance: float  # of the solution, relative
@@ -77,7 +77,7 @@ class Converged(NamedTuple):
 
 @njit(**COMPILED, forceinline=True)
 def solve(kernel, dim, r, m, nc, mass, H, ratio, reach, largest, tolerance):
-    """The root of eqs 7 and 15: Newton's iteration, safeguarded by bisection."""
+    """Return the root of eqs 7 and 15 by Newton's iteration, safeguarded by bisection."""
     C = normalisation(kernel, dim)
     D = len(dim)
     target = mass * ratio**D / C  # sum m w at the root of eqs 7 and 15

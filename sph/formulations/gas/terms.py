@@ -1,4 +1,4 @@
-"""What the gas's pair loops and thermodynamics ask of the terms that parts bring.
+"""Interfaces of the terms that parts add to the pair loops and thermodynamics of the gas.
 
 viscosity   pair_alpha(alpha_i, alpha_j), and where alpha has a rate alpha_rate(…)
 balsara     balsara_factor(divergence, curl, sound_speed, support)

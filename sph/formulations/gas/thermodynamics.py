@@ -1,7 +1,7 @@
-"""What follows from density and energy, once a particle: EOS, Balsara's factor, alpha's rate.
+"""Quantities of one particle from density and energy: EOS, Balsara factor, rate of alpha.
 
-The density pass calls these for each particle once its sums are known; the pair loops of the rates
-see their results only. Arrays are (N,), i is the particle.
+The density pass calls these functions for each particle after its sums; the pair loops of the rate
+pass use only their results. Arrays are (N,), i is the particle.
 """
 
 from numba import njit

@@ -1,37 +1,40 @@
-"""Artificial conductivity: heat that flows between neighbours to smooth a contact.
+"""Artificial conductivity: exchange of internal energy between neighbours, which smooths contacts.
 
-A conductivity is a file that holds a NamedTuple with the method
+A conductivity is a file with a NamedTuple that has the method
 
     exchange_speed(pressure_i, pressure_j, density_i, density_j, w_ij)    speed of the exchange
 
 where w_ij <= 0 is the speed of approach (eq 26). The pair then exchanges energy at the rate
-m_j exchange_speed (u_i - u_j) / rho_ij (dW/dr), equal and opposite for the two. A field `switched`
-tells whether that is times the mean of the two particles' shares, found by the pass over contacts.
-The class attribute `suits_gravity` tells whether it rests in equilibrium with an external field.
+m_j exchange_speed (u_i - u_j) / rho_ij (dW/dr), equal and opposite for the two. If the field
+`switched` is true, the rate is multiplied by the mean of `share` of both particles, from the pass
+over contacts. The class attribute `suits_gravity` is true if there is no exchange in hydrostatic
+equilibrium in an external field.
 """
+
+import math
 
 from sph import registry
 from sph.model import Model
 from sph.part import Key, Part, Pass
-from sph.parts.conductivity.contacts import contacts
+from sph.parts.conductivity._contacts import contacts
 from sph.state import Field
 
 FOLDER = "sph.parts.conductivity"
 
-# The strength times C beyond which the leapfrog is unstable (docs/measurements.md, "Time step and
+# Largest strength times C at which the leapfrog is stable (docs/measurements.md, "Time step and
 # viscosity").
 LARGEST = 1.5
 
 
 class Exchange(Model):
-    """What a conductivity may leave out."""
+    """Defaults of a conductivity."""
 
     suits_gravity = True
     switched = False
 
 
 class Conductivity(Part):
-    """A term of the energy equation, and where it is switched the pass that finds contacts."""
+    """A term of the energy equation, with a pass that finds contacts if `switched` is true."""
 
     title = "artificial conductivity"
     keys = (
@@ -86,7 +89,7 @@ class Conductivity(Part):
         switch = "switch of conductivity"
         if self.exchange.switched:
             return [self.title, switch], []
-        return [self.title], [(switch, "no conductivity asks for it")]
+        return [self.title], [(switch, "physics.conductivity is not switched")]
 
     def _find_contacts(self, sweep) -> None:
         s = sweep.state
@@ -96,13 +99,12 @@ class Conductivity(Part):
         )  # fmt: skip
 
     def largest_courant(self):
-        return LARGEST / self.exchange.strength if self.exchange.strength else float(
-            "inf"
-        ), self.name
+        strength = self.exchange.strength
+        return (LARGEST / strength if strength else math.inf), self.name
 
     def criterion_words(self, criterion):
         if criterion == self.name:
-            return "the strength of physics.conductivity and the speed of its signals"
+            return "signal speed, with C reduced for the strength of physics.conductivity"
         return None
 
     def held_words(self, criterion):
@@ -112,5 +114,5 @@ class Conductivity(Part):
         if trouble == "long steps" and held_by == self.name:
             return ["a smaller strength of physics.conductivity"]
         if trouble == "short steps" and held_by == self.name:
-            return [f"less of what sets it: {self.held_words(held_by)}"]
+            return [f"a smaller value of {self.held_words(held_by)}"]
         return []

@@ -1,6 +1,6 @@
-"""Conductivity at the speed of approach of the pair (Wadsley, Veeravalli & Couchman 2008).
+"""Conductivity with the speed of approach of the pair (Wadsley, Veeravalli & Couchman 2008).
 
-It acts where gas converges and nowhere in equilibrium, so it may be used with gravity.
+It acts only in converging flow, not in equilibrium, so it may be used with external fields.
 """
 
 from typing import Annotated, NamedTuple
@@ -11,7 +11,7 @@ from sph.parts.conductivity import Exchange
 
 @model(Exchange)
 class Approach(NamedTuple):
-    """`strength`: 1 exchanges heat as fast as the pair approaches. `switched`: at contacts only."""
+    """`strength`: factor of the speed of approach. `switched`: limit the exchange to contacts."""
 
     strength: Annotated[float, Parameter("1 is the value of the paper", at_least=0.0)] = 1.0
     switched: Annotated[bool, Parameter("at contacts only")] = False

@@ -1,7 +1,7 @@
-"""Conductivity at the speed that a pressure jump would drive (Price 2008, eqs 27-28).
+"""Conductivity with the speed sqrt(|P_i - P_j|/rho) of a pressure jump (Price 2008, eqs 27-28).
 
-It acts where the pressure jumps and energy differs: at a contact until its pressure is even, and at
-the start of a shock. It must not be used with gravity, where pressure varies in equilibrium.
+It acts at jumps of pressure: at a contact until its pressure is uniform, and at the start of a
+shock. It must not be used with external fields, in which pressure varies in equilibrium.
 """
 
 from typing import Annotated, NamedTuple
@@ -14,7 +14,7 @@ from sph.parts.conductivity import Exchange
 
 @model(Exchange)
 class PressureJump(NamedTuple):
-    """`strength`: 1 is the value of the paper. `switched`: at contacts only."""
+    """`strength`: 1 is the value of Price (2008). `switched`: limit the exchange to contacts."""
 
     strength: Annotated[float, Parameter("1 is the value of the paper", at_least=0.0)] = 1.0
     switched: Annotated[bool, Parameter("at contacts only")] = False

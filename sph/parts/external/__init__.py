@@ -1,12 +1,12 @@
-"""External fields: forces on the gas from what is not gas. One file each, a NamedTuple with
+"""External gravitational fields, one file each: a NamedTuple with
 
     acceleration(position)    (D, N) at positions (D, N)
-    potential(position)       (N,) per unit mass, zero at infinity or wherever the file says
-    misfit(boundaries)        why it cannot act in a box of these boundaries (a name for each
-                              axis) and what to try; None if it can
+    potential(position)       (N,) per unit mass, zero at infinity or where the file says
+    misfit(boundaries)        why the field cannot be used with these boundaries (one per axis) and
+                              what to try, or None
 
-The first two are called from Python, once a step, by scenes that name a field and by no others; the
-last when a configuration is read. A mirror suits every field: no particle jumps in its potential.
+The first two are called from Python once per step; the last when a configuration is read.
+Reflecting walls suit every field, since no particle jumps in its potential.
 """
 
 from sph import registry
@@ -17,16 +17,16 @@ FOLDER = "sph.parts.external"
 
 
 class Field(Model):
-    """What a field may leave out."""
+    """Defaults of an external field."""
 
-    softening = 0.0  # a length, where it can be softened
+    softening = 0.0  # a length; 0 for fields without softening
 
     def misfit(self, boundaries):
         return None
 
 
 class External(Part):
-    """A field from outside, its potential energy, and the bound that |a| sets on the step."""
+    """An external field, its potential energy, and the limit of |a| on the time step."""
 
     title = "external field"
     keys = (
@@ -70,7 +70,7 @@ class External(Part):
     def remedies(self, trouble, held_by):
         softening = f"a {'larger ' * (self.field.softening > 0.0)}softening of physics.external"
         if trouble == "endless energy":
-            return [f"{softening}, or no particle where its mass is"]
+            return [f"{softening}, or no particle at the position of its mass"]
         if trouble == "drift" or (trouble == "short steps" and held_by == "acceleration"):
             return [softening]
         return []

@@ -1,6 +1,6 @@
-"""Gravity of a point mass at rest in the origin (G = 1), softened as in Plummer (1911).
+"""Gravity of a point mass at rest at the origin (G = 1), with Plummer softening.
 
-a = -M r/(r^2 + s^2)^(3/2) and phi = -M/(r^2 + s^2)^(1/2), in 1 to 3 dimensions alike.
+a = -M r/(r^2 + s^2)^(3/2) and phi = -M/(r^2 + s^2)^(1/2), in any dimension.
 """
 
 from typing import Annotated, NamedTuple
@@ -13,14 +13,14 @@ from sph.parts.external import Field
 
 @model(Field)
 class PointMass(NamedTuple):
-    """`mass`: G M; `softening`: s, a length."""
+    """`mass`: M; `softening`: the length s."""
 
     mass: Annotated[float, Parameter("G M", at_least=0.0)]
     softening: Annotated[float, Parameter("length below which it is weaker", at_least=0.0)] = 0.0
 
     def acceleration(self, position):
         squared = self._softened(position)
-        # a particle in the very centre of an unsoftened mass is pulled no way
+        # at the centre of an unsoftened mass the acceleration is set to 0
         return -self.mass * position / np.where(squared > 0.0, squared, np.inf) ** 1.5
 
     def potential(self, position):
@@ -30,8 +30,8 @@ class PointMass(NamedTuple):
     def misfit(self, boundaries):
         if "periodic" in boundaries:
             return (
-                "the mass has no periodic images, so a particle that crosses a periodic face jumps "
-                "in its potential and total energy with it; expected no periodic axis. Try: "
+                "expected no periodic axis: the mass has no periodic images, so the potential of a "
+                "particle, and total energy, would jump when it crosses a periodic boundary. Try: "
                 'problem.boundary = "open" or "mirror", or another problem'
             )
         return None

@@ -1,11 +1,10 @@
-"""Heating and cooling: sources of internal energy other than the flow. One file each, a NamedTuple
-with
+"""Heating and cooling that is not caused by the flow, one file each: a NamedTuple with
 
-    heated(internal_energy, dt)    (N,) u after dt of heating alone, from (N,) u: exact or implicit
+    heated(internal_energy, dt)    u (N,) after heating alone for dt, exact or implicit
 
-so that however stiff a source is, it never shortens the step: a step has half of it at either end
-(Strang 1968, SIAM J. Numer. Anal. 5, 506). What it adds is counted in the history and taken out of
-the energy drift. Called from Python, by scenes that name a source and by no others.
+The method is exact or implicit, so stiff heating does not limit the time step. Each step applies
+it for dt/2 at its beginning and end (Strang splitting: Strang 1968, SIAM J. Numer. Anal. 5, 506).
+The history records the energy added, which does not count as energy drift. Called from Python.
 """
 
 from sph import registry
@@ -15,7 +14,7 @@ FOLDER = "sph.parts.heating"
 
 
 class Heating(Part):
-    """A source of internal energy, solved by itself over half a step at either end."""
+    """Heating or cooling, applied for half a step at the beginning and end of each step."""
 
     title = "heating"
     keys = (

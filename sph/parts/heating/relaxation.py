@@ -9,7 +9,7 @@ from sph.model import Model, Parameter, model
 
 @model(Model)
 class Relaxation(NamedTuple):
-    """`energy`: u_eq, per unit mass, that the gas relaxes to; `time`: tau it takes."""
+    """`energy`: u_eq, per unit mass, to which the gas relaxes; `time`: tau, the relaxation time."""
 
     energy: Annotated[float, Parameter("per unit mass, that the gas relaxes to", above=0.0)]
     time: Annotated[float, Parameter("that it takes", above=0.0)]

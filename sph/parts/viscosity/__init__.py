@@ -1,31 +1,31 @@
-"""Artificial viscosity: how the coefficient alpha of a pair comes about, and Balsara's factor.
+"""Artificial viscosity: the coefficient alpha of a pair, and the Balsara factor.
 
 A viscosity is a NamedTuple with the methods
 
     pair_alpha(alpha_i, alpha_j)    alpha of the pair (eq 24)
     start()                         alpha of every particle at t = 0
-    largest()                       the most that alpha may become
+    largest()                       upper limit of alpha
 
-and the class attribute `evolves`: False where alpha is one number (constant.py), which then costs
-no array. The others are the files of switches/, and have one method more,
+and the class attribute `evolves`, False if alpha is one number (constant.py), which needs no array.
+The viscosities in switches/ also have the method
 
     alpha_rate(alpha, h, sound_speed, divergence)    rate of change of alpha (eqs 27-28)
 
-or, with the class attribute `finds_shocks`, which brings the pass over velocity gradients,
+or, with the class attribute `finds_shocks`, which requires the pass over velocity gradients,
 
     alpha_after(alpha, dt, support, signal_speed, divergence, divergence_rate, shear, signs)
 
-alpha at the end of a step dt. Of the particle's support H, signal_speed is the largest
-(c_i + c_j)/2 - w_ij, divergence_rate d(div v)/dt, shear the sum of squares of the traceless
-rate of strain, signs the mean of sgn(div v_j) weighted by the kernel.
+which returns alpha at the end of a step dt. signal_speed is the largest (c_i + c_j)/2 - w_ij within
+the support H, divergence_rate d(div v)/dt, shear the sum of squares of the traceless rate of
+strain, and signs the kernel-weighted mean of sgn(div v_j).
 """
 
 import math
 
 from sph import registry
 from sph.integrators.leapfrog import STRAIGHT
-from sph.model import Model
-from sph.part import Evolved, Key, Part, Pass
+from sph.model import Model, Parameter
+from sph.part import Evolved, Key, Part
 from sph.state import Field, Public
 
 SWITCHES = "sph.parts.viscosity.switches"
@@ -39,20 +39,24 @@ ALPHA = Field(
 )
 ALPHA_RATE = Field("alpha_rate", remade=True)
 
-# A larger alpha keeps colliding gas from passing through itself where alpha is small; where it is
-# large it is a smaller one that lowers the drift (docs/measurements.md, "Time step and viscosity").
+# A larger alpha prevents interpenetration if alpha is small. If alpha is large, a smaller alpha
+# reduces energy drift (docs/measurements.md, "Time step and viscosity").
 SMALL_ALPHA, LARGE_ALPHA = 1.0, 2.0
 
 
 class Coefficient(Model):
-    """What a viscosity may leave out."""
+    """Defaults of a viscosity."""
 
     evolves = True
     finds_shocks = False
 
 
+LOWEST = Parameter("smallest alpha: each alpha decays to this value", at_least=0.0)
+HIGHEST = Parameter("largest alpha, approached in strong compression", at_least=0.0)
+
+
 class Switch(Coefficient):
-    """The base of switches: alpha from `min` to `max`, a pair takes the mean of its two."""
+    """Base of switches: alpha is between `min` and `max`; a pair uses the mean of both."""
 
     def issues(self):
         if self.min > self.max:
@@ -66,11 +70,11 @@ class Switch(Coefficient):
         return self.max
 
     def pair_alpha(self, alpha_i, alpha_j):
-        return 0.5 * (alpha_i + alpha_j)  # eq 24 prints alpha = 1.0; the pair takes the mean
+        return 0.5 * (alpha_i + alpha_j)  # eq 24 with the mean of both in place of a constant
 
 
 class Viscosity(Part):
-    """The coefficient alpha, its evolution, and Balsara's factor."""
+    """The coefficient alpha, its evolution, and the Balsara factor."""
 
     keys = (
         Key(
@@ -88,8 +92,8 @@ class Viscosity(Part):
         ),
         Key(
             "balsara",
-            "Balsara factor: reduces artificial viscosity where the flow shears or "
-            "rotates; in 1-D, only where |div v| is below about 1e-4 c/H, with c the speed of sound",
+            "Balsara factor: reduces artificial viscosity where the flow shears or rotates; "
+            "in 1-D, only where |div v| is below about 1e-4 c/H, with c the speed of sound",
             kind=bool,
             default=True,
         ),
@@ -115,7 +119,7 @@ class Viscosity(Part):
         if balanced and dimension > 1:
             self.needs += ("curl_v",)
         if coefficient.finds_shocks:
-            from sph.parts.viscosity.shocks import find
+            from sph.parts.viscosity._shocks import find
 
             self.passes = (find,)
 
@@ -139,14 +143,18 @@ class Viscosity(Part):
             (
                 self.coefficient.finds_shocks,
                 "gradients of velocity",
-                "no switch asks for them",
+                "not needed by physics.alpha",
             ),
             (self.balsara is not None, "Balsara factor", "physics.balsara = false"),
-            ("div_v" in self.needs, "divergence of velocity", "neither Balsara nor alpha needs it"),
+            (
+                "div_v" in self.needs,
+                "divergence of velocity",
+                "not needed by Balsara factor or alpha",
+            ),
             (
                 "curl_v" in self.needs,
                 "curl of velocity",
-                "no curl in 1-D" if self.dimension == 1 else "no Balsara factor asks for it",
+                "no curl in 1-D" if self.dimension == 1 else "physics.balsara = false",
             ),
         ):
             if there:
@@ -166,7 +174,8 @@ class Viscosity(Part):
         return stable, self.name if alpha > 2.0 * stable else "signal_speed"
 
     def criterion_words(self, criterion):
-        return "physics.alpha and the speed of its signals" if criterion == self.name else None
+        reason = "signal speed, with C reduced for physics.alpha"
+        return reason if criterion == self.name else None
 
     def held_words(self, criterion):
         return "physics.alpha" if criterion == self.name else None
@@ -178,5 +187,5 @@ class Viscosity(Part):
             if self.coefficient.largest() < SMALL_ALPHA:
                 return ["a larger physics.alpha if particles pass through each other"]
         if trouble == "short steps" and held_by == self.name:
-            return ["less of what sets it: physics.alpha"]
+            return ["a smaller value of physics.alpha"]
         return []

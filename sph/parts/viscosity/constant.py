@@ -1,4 +1,4 @@
-"""One viscosity coefficient for all particles and all times."""
+"""Constant viscosity coefficient."""
 
 from typing import NamedTuple
 

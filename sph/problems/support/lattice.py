@@ -1,8 +1,8 @@
-"""Particle placement: lattices that fill a box with cells of one volume, noise, and a glass.
+"""Particle placement: lattices of cells of equal volume, noise, and a disordered glass.
 
-Every lattice is a stack of layers along x. Layer i holds the sites of a rectangular grid across y
-and z, and layers of two-site cells (hexagonal, BCC) alternate between two offsets. Sites lie inside
-the cells, so no particle lies on a face and periodic images continue the lattice.
+Every lattice is a stack of layers along x. A layer holds the sites of a rectangular grid in y and
+z. Layers of two-site cells (hexagonal, BCC) alternate between two offsets. Sites lie inside the
+cells, so no particle lies on a face of the box, and periodic images continue the lattice.
 """
 
 from typing import NamedTuple
@@ -11,7 +11,7 @@ import numpy as np
 
 
 class Cell(NamedTuple):
-    """Unit cell of a lattice. Sites have equal distances along x, one to a layer."""
+    """Unit cell of a lattice. Sites are equidistant along x, one per layer."""
 
     sides: tuple[float, ...]  # (D,) relative lengths
     sites: tuple[tuple[float, ...], ...]  # each (D,), as fractions of the sides
@@ -24,33 +24,38 @@ _STAGGERED = (0.25, 0.75)
 
 
 def unit_cell(kind: str, dimension: int) -> Cell:
-    """The cell of "cubic" (any dimension), "hexagonal" (2-D) or "bcc" (3-D). Else ValueError."""
+    """Return the cell of "cubic" (any dimension), "hexagonal" (2-D) or "bcc" (3-D).
+
+    Raises ValueError for another name or dimension.
+    """
     if kind == "cubic":
         return Cell((1.0,) * dimension, ((0.5,) * dimension,))
     own_dimension = {"hexagonal": 2, "bcc": 3}.get(kind)
     if own_dimension is None:
-        raise ValueError(f'no lattice "{kind}"; there are "cubic", "hexagonal" (2-D), "bcc" (3-D)')
+        raise ValueError(f'lattice "{kind}": expected "cubic", "hexagonal" (2-D) or "bcc" (3-D)')
     if dimension != own_dimension:
         instead = {2: '"cubic" or "hexagonal"', 3: '"cubic" or "bcc"'}.get(dimension, '"cubic"')
         raise ValueError(
-            f'lattice "{kind}" is for {own_dimension} dimensions; in {dimension} take {instead}'
+            f'lattice "{kind}" exists only in {own_dimension}-D; expected {instead} in '
+            f"{dimension}-D"
         )
     sides = (1.0, np.sqrt(3.0)) if kind == "hexagonal" else (1.0,) * 3
     return Cell(sides, tuple((offset,) * dimension for offset in _STAGGERED))
 
 
 def checked(kind: str, dimension: int | None) -> str:
-    """`kind` itself if it can be filled in so many dimensions (None: any). Else ValueError."""
+    """Return `kind`. Raises ValueError if that lattice does not exist in `dimension`."""
     if dimension is not None and kind not in ("relaxed", "random"):
         unit_cell(kind, dimension)
     return kind
 
 
 def whole_cells(box: np.ndarray, cells: float, sides, multiple: int = 1) -> tuple[int, ...]:
-    """Whole numbers of cells along each axis of `box` (D, 2), in all nearest to `cells`.
+    """Return the numbers of cells along each axis of `box` (D, 2), with a product near `cells`.
 
-    Cells keep nearly the shape `sides` (D,): one axis is cut into whole cells, the others follow,
-    so axes of equal length get equal numbers. Each number is a multiple of `multiple`.
+    Cells have nearly the shape `sides` (D,): the number along one axis is a whole number, those
+    along the others are rounded, so axes of equal length get equal numbers. Each number is a
+    multiple of `multiple`.
     """
     lengths = (box[:, 1] - box[:, 0]) / np.asarray(sides)
     scale = (lengths.prod() / cells) ** (1.0 / lengths.size)
@@ -64,13 +69,13 @@ def whole_cells(box: np.ndarray, cells: float, sides, multiple: int = 1) -> tupl
 
 
 def stack(cell: Cell, layers: range, origin: float, thickness: float, across, counts) -> np.ndarray:
-    """Positions (D, N) of layers; layer i is centred at x = origin + (i + 1/2) thickness.
+    """Return positions (D, N) of layers; layer i is centred at x = origin + (i + 1/2) thickness.
 
-    `across` (D - 1, 2) and `counts` (D - 1) are the box and the number of cells across y and z.
-    Indices may be negative: stacks on either side of `origin` continue one another.
+    `across` (D - 1, 2) and `counts` (D - 1) are the box and the number of cells along y and z.
+    Indices may be negative: stacks on both sides of `origin` form one lattice.
     """
     index = np.arange(layers.start, layers.stop)
-    per_layer = int(np.prod(counts))  # 1 where there is nothing across
+    per_layer = int(np.prod(counts))  # 1 in 1-D
     corner = np.indices(counts).reshape(len(counts), per_layer)
     across = np.asarray(across, dtype=float).reshape(len(counts), 2)
     step = (across[:, 1] - across[:, 0]) / np.asarray(counts, dtype=float)
@@ -82,7 +87,7 @@ def stack(cell: Cell, layers: range, origin: float, thickness: float, across, co
 
 
 def grid(box: np.ndarray, kind: str, counts) -> np.ndarray:
-    """Positions (D, N) of a lattice of `counts` (D) cells, stretched to fill `box` (D, 2)."""
+    """Return positions (D, N) of a lattice of `counts` (D) cells stretched to fill `box` (D, 2)."""
     cell = unit_cell(kind, len(box))
     layers = counts[0] * len(cell.sites)
     thickness = (box[0, 1] - box[0, 0]) / layers
@@ -90,12 +95,12 @@ def grid(box: np.ndarray, kind: str, counts) -> np.ndarray:
 
 
 def fill(box: np.ndarray, n: int, kind: str, seed: int = 0, even: bool = False) -> np.ndarray:
-    """Positions (D, N), N nearest to n, one equal volume each, that fill `box` (D, 2).
+    """Return positions (D, N) that fill `box` (D, 2), with equal volumes and N close to n.
 
-    `kind` is one of `unit_cell`, "relaxed", a periodic glass drawn from `seed`, or "random",
-    places drawn from it evenly over the box (a Poisson process given its number). `even`
-    asks for an even number of cells along each axis: the centre of the box is a corner of cells.
-    Raises ValueError for a lattice that does not exist in so many dimensions.
+    kind: a lattice of `unit_cell`; "relaxed", a periodic glass; or "random", uniformly distributed
+    positions. The last two use random numbers with `seed`. even: use an even number of cells along
+    each axis, so that the centre of the box is a corner of cells. Raises ValueError for a lattice
+    that does not exist in D dimensions.
     """
     box = np.asarray(box, dtype=float)
     if kind == "random":
@@ -109,14 +114,14 @@ def fill(box: np.ndarray, n: int, kind: str, seed: int = 0, even: bool = False) 
 
 
 def spacing(box: np.ndarray, n: int) -> float:
-    """Side of a cube of the volume of one of n particles in `box` (D, 2)."""
+    """Return the particle spacing of n particles in `box` (D, 2): (volume/n)^(1/D)."""
     return float((np.prod(box[:, 1] - box[:, 0]) / n) ** (1.0 / len(box)))
 
 
 def with_noise(position: np.ndarray, box: np.ndarray, fraction: float, seed: int) -> np.ndarray:
-    """Positions (D, N) moved along each axis by up to `fraction` of the spacing, evenly drawn.
+    """Return positions (D, N) with uniform random shifts of up to `fraction` spacings per axis.
 
-    What would leave `box` (D, 2) enters on the other side.
+    Particles that leave `box` (D, 2) are wrapped to the other side.
     """
     reach = fraction * spacing(box, position.shape[1])
     moved = position + np.random.default_rng(seed).uniform(-reach, reach, position.shape)
@@ -129,17 +134,18 @@ def _wrapped(position: np.ndarray, box: np.ndarray) -> np.ndarray:
     return np.where(inside >= box[:, 1:], low, inside)  # mod of a tiny negative number is `length`
 
 
-# Repulsion of the glass: reach and strength of a sweep in spacings. Measured with Wendland C2 at
-# eta = 1.6: the density then scatters by 0.5 % in 2-D and 0.2 % in 3-D (10 % and 7 % before), and
-# no two particles are nearer than 0.85 spacings. A reach of 1.6 leaves 0.9 % and 0.6 %; 100 sweeps
-# take 1.7 times as long for 0.4 % and 0.2 %.
+# Repulsion of the glass: range and strength in spacings, and number of sweeps. With Wendland C2 at
+# eta = 1.6, the density then scatters by 0.5 % in 2-D and 0.2 % in 3-D (10 % and 7 % before), and
+# particles are at least 0.85 spacings apart. A range of 1.6 gives 0.9 % and 0.6 %; 100 sweeps take
+# 1.7 times as long and give 0.4 % and 0.2 %.
 _REACH, _STRENGTH, _SWEEPS = 2.0, 0.5, 60
 
 
 def _relaxed(box: np.ndarray, position: np.ndarray, seed: int) -> np.ndarray:
-    """A glass: each particle anywhere in its own cell, then pushed apart in sweeps, all periodic.
+    """Return a periodic glass: a random position in each cell, relaxed by repulsion in sweeps.
 
-    The start has no waves longer than a few cells, which short-ranged repulsion could not smooth.
+    The initial positions have no density waves longer than a few cells, which short-range repulsion
+    could not remove.
     """
     from scipy.spatial import cKDTree  # costs 0.1 s to import, which only a glass needs
 

@@ -4,7 +4,7 @@ import numpy as np
 
 
 def mode_amplitude(particles, x, height, velocity, wavelength: float) -> float:
-    """Amplitude of the mode of that wavelength along x in `velocity` (N,) (eqs 10-13).
+    """Amplitude of the mode of that wavelength along x in `velocity` (N,) (their eqs 10-13).
 
     `height` (N,) is y above the middle of the slab, whose faces are at heights of +-1/4. Particles
     weigh by their volume and by their distance from the nearer face, as a surface mode decays.

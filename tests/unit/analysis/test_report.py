@@ -266,14 +266,14 @@ def test_points_of_a_sweep_without_a_run_are_listed(tmp_path):
     (tmp_path / "sweep" / "problem.n=300").symlink_to("problem.n=300")  # to itself
     text = said(compared(tmp_path / "sweep"))
     assert "problem.n=200 (failed: the disk is full)" in text
-    assert "problem.n=300 (unfinished: it was not begun)" in text
+    assert "problem.n=300 (unfinished: not started)" in text
 
 
 def test_what_to_know(study, tmp_path):
     write_run(study / "restarted", 0.3, 50.0, ["problem.n=300"], steps=200)
     write_run(study / "longer", 0.3, 50.0, ["problem.n=300", "time.end=0.3"])
     text = said(compared(study))
-    assert "different tasks (time.end)" in text
+    assert "The runs differ in time.end:" in text
     assert "took to start" not in said(compared(study, cost="updates"))
 
 
@@ -415,7 +415,7 @@ def test_settings_changed_on_the_way_are_told_with_or_without_an_error(study):
         write_run(study / name, error, 50.0, ["problem.n=300"], settings_changed=[f"C of {name}"])
     text = said(compared(study))
     for name in ("with", "without"):
-        assert f"{name} changed its settings on the way: C of {name}." in text
+        assert f"{name} changed its settings in restarts: C of {name}." in text
 
 
 def test_restarts_matter_for_wall_clock_time_alone(study):

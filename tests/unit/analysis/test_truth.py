@@ -169,11 +169,11 @@ def test_errors_leave_out_what_the_ends_have_disturbed():
     low, high = -0.5 + 0.118322, 0.5 - 0.175216
     inside, words = truth.region(problem, eos, 0.1, x)
     np.testing.assert_array_equal(inside, ((low < x) & (x < high))[0])
-    assert words == "-0.3817 < x < 0.3248, where no wave from the domain's ends has come"
+    assert words == "-0.3817 < x < 0.3248, where no wave from the domain's ends has arrived"
     ranged = made("shock_tube", "problem.boundary=periodic", "problem.error_range=[-0.2, 0.4]")
     inside, words = truth.region(ranged.problem, eos, 0.1, x)
     np.testing.assert_array_equal(inside, ((x > -0.2) & (x < high))[0])
-    assert words.startswith("-0.2 < x < 0.4, of it -0.3817 < x < 0.3248")
+    assert words.startswith("-0.2 < x < 0.4, within -0.3817 < x < 0.3248")
     quiet = made("shock_tube", "problem.boundary=periodic", "problem.error_range=[-0.2, 0.3]")
     assert truth.region(quiet.problem, eos, 0.1, x)[1] == "-0.2 < x < 0.3"
 
@@ -260,4 +260,4 @@ def test_the_region_in_words_names_the_axes_with_ends_alone():
         gas.problem, gas.physics.eos_model(), 0.1, np.array([[0.5, 0.5], [0.5, 0.1]])
     )
     assert inside.tolist() == [True, False]
-    assert words == "0.1183 < y < 0.8817, where no wave from the domain's ends has come"
+    assert words == "0.1183 < y < 0.8817, where no wave from the domain's ends has arrived"

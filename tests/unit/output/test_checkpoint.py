@@ -129,7 +129,7 @@ def test_hash_sees_values_names_types_and_shapes():
 
 
 def test_missing_file(tmp_path):
-    refused(tmp_path / "no.h5", "there is no checkpoint")
+    refused(tmp_path / "no.h5", "checkpoint not found")
 
 
 def test_directory(tmp_path):
@@ -369,7 +369,7 @@ def test_no_particles(tmp_path, make_state):
     digest.set_result(checkpoint.state_hash(checkpoint._state(state)))
     with h5py.File(path, "w") as file:
         group = file.create_group("Checkpoint")
-        checkpoint._write_private(group, state, checkpoint._state(state), digest)
+        checkpoint._write_private(group.id, state, checkpoint._state(state), digest)
     refused(path, "0 particles")
 
 

@@ -38,7 +38,7 @@ def written(fill) -> bytes:
 
 def test_attributes_are_those_of_h5py():
     def ours(file):
-        hdf5.write_attributes(hdf5.create_group(file, "Header"), ATTRIBUTES)
+        hdf5.write_attributes(hdf5.create_group(file.id, "Header"), ATTRIBUTES)
 
     assert written(ours) == written(
         lambda file: file.create_group("Header").attrs.update(ATTRIBUTES)
@@ -48,7 +48,7 @@ def test_attributes_are_those_of_h5py():
 @pytest.mark.parametrize("name", ARRAYS)
 def test_datasets_are_those_of_h5py(name):
     array = ARRAYS[name]
-    assert written(lambda file: hdf5.write_dataset(file, "a", array)) == written(
+    assert written(lambda file: hdf5.write_dataset(file.id, "a", array)) == written(
         lambda file: file.create_dataset("a", data=array)
     )
 
@@ -62,6 +62,15 @@ def test_checked_datasets_are_those_of_h5py(name):
         file.create_dataset("a", data=array, chunks=chunks, fletcher32=True)
 
     def ours(file):
-        assert hdf5.write_dataset(file, "a", array, chunks).fletcher32
+        hdf5.write_dataset(file.id, "a", array, chunks)
 
     assert written(ours) == written(theirs)
+
+
+def test_links_are_those_of_h5py():
+    def theirs(file):
+        file["Density"] = h5py.SoftLink("/PartType0/Densities")
+
+    assert written(lambda file: hdf5.link(file.id, "Density", "/PartType0/Densities")) == written(
+        theirs
+    )

@@ -97,7 +97,7 @@ def test_a_worker_that_does_not_see_the_files(cluster, program, tmp_path, monkey
     elsewhere = Task(SweepDirectory(tmp_path / "nowhere"), Point("a", ()), ())
     ours.run([elsewhere], cluster.scheduler_address, told.append)
     assert [one.status for one in told] == ["failed"]
-    assert "the sweep's files must be shared" in told[0].reason
+    assert "the files of a sweep must be shared" in told[0].reason
 
 
 def test_no_scheduler_answers(program, tmp_path, monkeypatch):

@@ -8,7 +8,7 @@ from sph.model import model
 
 @model(Scheme)
 class GradH(NamedTuple):
-    """Conserves energy and momentum pair by pair to round-off; entropy drifts in smooth flow."""
+    """Conserves energy and momentum of each pair to round-off; entropy drifts in smooth flow."""
 
     def pair(self, term_i, term_j, slope_i, slope_j, Pi):
         slope = slope_i + slope_j

@@ -1,14 +1,14 @@
 """Density-independent SPH in pressure-energy form (Hopkins 2013, eqs 21-22; Saitoh & Makino 2013).
 
-The pressure is summed over neighbours, P_i = (gamma - 1) sum m_j u_j W_ij(H_i), so it is smooth
-across a contact however the density jumps there. With grad W_i for grad_i W_ij(H_i),
+The pressure is a sum over neighbours, P_i = (gamma - 1) sum m_j u_j W_ij(H_i), so it is smooth
+across a contact for any jump of density. With grad W_i for grad_i W_ij(H_i),
 
     dv_i/dt = -sum m_j (gamma - 1)^2 u_i u_j [f_ij/P_i grad W_i + f_ji/P_j grad W_j]
     du_i/dt = sum m_j (gamma - 1)^2 u_i u_j f_ij/P_i v_ij . grad W_i
 
-f_ij = 1 - g_i/u_j follows from his eq 12 for supports that hold a mass (eqs 7 and 15 here; he lets
-them hold a number of particles): g_i = (H_i/D) (dP_i/dH_i) / [(gamma - 1) Omega_i rho_i]. Where u
-is uniform this is the variational scheme.
+f_ij = 1 - g_i/u_j follows from Hopkins' eq 12 for supports that contain a given mass (eqs 7 and 15;
+his contain a given number of particles): g_i = (H_i/D) (dP_i/dH_i) / [(gamma - 1) Omega_i rho_i].
+For uniform u this is the variational scheme.
 """
 
 from typing import NamedTuple
@@ -20,7 +20,7 @@ from sph.model import model
 
 @model(Scheme)
 class PressureEnergy(NamedTuple):
-    """For ideal gases: no surface tension at contacts, noise where u jumps by orders."""
+    """Only for ideal gases: no surface tension at contacts, but noise at very large jumps of u."""
 
     sums_pressure = True
     pair = Variational.pair

@@ -1,4 +1,4 @@
-"""Grad-h SPH from the Lagrangian: each pressure with its own kernel (Springel & Hernquist 2002).
+"""Grad-h SPH from a Lagrangian: each pressure with its own kernel (Springel & Hernquist 2002).
 
 Their eq 7: dv_i/dt = -sum m_j [P_i/(Omega_i rho_i^2) grad W_i + P_j/(Omega_j rho_j^2) grad W_j].
 """
@@ -14,7 +14,7 @@ class Variational(NamedTuple):
     """Conserves energy, momentum and, without viscosity, entropy."""
 
     def pair(self, term_i, term_j, slope_i, slope_j, Pi):
-        # the slopes carry the half of eq 22's average, which only viscosity keeps
+        # slopes contain the 1/2 of the average in eq 22, which applies only to viscosity
         viscous = (slope_i + slope_j) * Pi
         own = 2.0 * slope_i * term_i
         return own + 2.0 * slope_j * term_j + viscous, own + 0.5 * viscous

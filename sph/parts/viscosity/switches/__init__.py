@@ -1,1 +1,1 @@
-"""Switches: how each particle's viscosity coefficient rises in shocks and decays. One file each."""
+"""Viscosity switches, one file each: alpha of a particle rises in shocks and decays afterwards."""

@@ -6,20 +6,16 @@ Eqs 6, 27, 28, 31 (Morris & Monaghan 1997; the source term as in Rosswog et al. 
 from typing import Annotated, NamedTuple
 
 from sph.compiled import larger
-from sph.model import Parameter, model
-from sph.parts.viscosity import Switch
+from sph.model import model
+from sph.parts.viscosity import HIGHEST, LOWEST, Switch
 
 
 @model(Switch)
 class MorrisMonaghan(NamedTuple):
-    """`min`: where alpha decays to; `max`: where strong compression drives it."""
+    """`min`: value to which alpha decays; `max`: value that alpha approaches in strong shocks."""
 
-    min: Annotated[
-        float, Parameter("smallest alpha: each alpha decays to this value", at_least=0.0)
-    ]
-    max: Annotated[
-        float, Parameter("largest alpha, approached in strong compression", at_least=0.0)
-    ]
+    min: Annotated[float, LOWEST]
+    max: Annotated[float, HIGHEST]
 
     def alpha_rate(self, alpha, h, sound_speed, divergence):
         decay = (alpha - self.min) * 0.25 * sound_speed / h  # eq 27

@@ -1,11 +1,11 @@
-"""The pass over velocity gradients, for switches that tell shocks by them.
+"""The pass for velocity gradients, for viscosity switches that detect shocks by them.
 
 Gradients are those of Cullen & Dehnen (2010, appendix B): with r = r_i - r_j and weights
 g_j = -w_j (dW/dr)/r (w_j the mass, or 1: `weighting`), the matrix sum g v_ij r^T times the inverse
-of sum g r r^T is exact for every linear field. d(div v)/dt = div a - tr(L L), L the velocity
-gradient, takes the acceleration of the last step. (A difference of div v over a step would not do:
-a step cut short to land on an output divides what prediction and correction differ by, which does
-not shrink with it.)
+of sum g r r^T is exact for linear fields. d(div v)/dt = div a - tr(L L), with L the velocity
+gradient, uses the acceleration of the last step. (The difference of div v over a step is
+unsuitable: in a step cut for an output, the difference between prediction and correction does not
+shrink with the step.)
 """
 
 import numpy as np
@@ -19,8 +19,8 @@ from sph.part import Pass
 from sph.passes import TINY
 from sph.passes.gather import copy_in, most_candidates, place_in, unpacked
 
-# A pivot below this part of the trace means that neighbours lie on a line or in a plane: there is
-# no gradient, and it counts as zero.
+# A pivot below this fraction of the trace means that neighbours lie on a line or in a plane. The
+# gradient is then undefined and set to zero.
 SINGULAR = 1e-6
 
 
@@ -35,9 +35,9 @@ def alpha_after(
 
 @njit(**COMPILED, forceinline=True)
 def _invert(matrix, inverse):
-    """Inverse of a symmetric positive (D, D) matrix by Gauss and Jordan; zero where it has none.
+    """Write the inverse of a symmetric positive (D, D) matrix, zero if singular (Gauss-Jordan).
 
-    Positive matrices need no exchange of rows. `matrix` is used up.
+    Positive matrices need no pivoting. `matrix` is overwritten.
     """
     D = matrix.shape[0]
     trace = 0.0
@@ -120,7 +120,7 @@ def shocks(
                 q[k] = r * H_inv
                 weights[k] = -m[k] * dw_over_q(kernel, dim, r * H_inv)
                 signs += signed[k] * w(kernel, dim, r * H_inv)
-                v_sig = c_half_i + c_half[k] - smaller(v_dot_r, 0.0) / r  # eq 15
+                v_sig = c_half_i + c_half[k] - smaller(v_dot_r, 0.0) / r  # eq 76
                 fastest = larger(fastest, v_sig if r * H_inv < 1.0 else 0.0)
             # a third of the candidates: worth a copy before the sums that follow
             n = 0
@@ -133,7 +133,7 @@ def shocks(
                     g_r[d, k] = weights[near[k]] * r_ij[d, k]
                     v_ij[d, k] = velocity[d, i] - v[d, near[k]]
                     a_ij[d, k] = acceleration[d, i] - a[d, near[k]]
-            signs *= mass_per_weight(weighting, mass[i]) * C * H_inv**D / density[i]  # eq 17
+            signs *= mass_per_weight(weighting, mass[i]) * C * H_inv**D / density[i]  # eq 73
             for s in range(D):
                 for t in range(s, D):
                     total = 0.0

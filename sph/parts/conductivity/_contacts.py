@@ -1,4 +1,4 @@
-"""The pass over the Laplacian of the energy, for conductivity that acts at contacts only.
+"""The pass for the Laplacian of u, for conductivity that is limited to contacts.
 
 lap u = 2 sum m_j/rho_j (u_i - u_j) (dW/dr)/r, as in Price & Monaghan (2005) after Brookshaw (1985).
 """
@@ -12,16 +12,17 @@ from sph.neighbours.order import BLOCK
 from sph.passes import TINY
 from sph.passes.gather import copy_in, most_candidates, place_in, unpacked
 
-COLD = 1e-300  # cold gas of one energy has no contact: zero over zero is none
+COLD = 1e-300  # gives 0 instead of 0/0 in uniform cold gas
 
 
 @njit(**COMPILED, forceinline=True)
 def share(h, laplacian, energy, signal_speed):
-    """What part of the conductivity acts on a particle, 0 to 1, from the Laplacian of its energy.
+    """Return the fraction of the conductivity that acts on a particle, 0 to 1.
 
-    Price (2008; Price & Monaghan 2005) lets a coefficient grow by 0.1 h |lap u| / sqrt(u) and decay
-    in h/(0.1 v_sig). This is where the two balance, so it needs no memory: it acts at once where a
-    contact begins, while there is a jump of pressure to drive it. h is the smoothing length.
+    The coefficient of Price (2008; Price & Monaghan 2005) grows at 0.1 h |lap u| / sqrt(u) and
+    decays in the time h/(0.1 v_sig), with h the smoothing length. Here it is the balance of growth
+    and decay, which needs no evolved quantity and acts at once on new contacts, while a jump of
+    pressure still drives the exchange.
     """
     return smaller(h * h * abs(laplacian) / (signal_speed * np.sqrt(energy) + COLD), 1.0)
 
@@ -31,7 +32,7 @@ def contacts(
     first_block, last_block, dim, models, neighbours, position, velocity, mass, energy, support,
     density, sound_speed, shares,
 ):  # fmt: skip
-    """Shares (N,) of the conductivity over blocks [first_block, last_block).
+    """Write the fractions (N,) of conductivity that act, for blocks [first_block, last_block).
 
     v_sig is the largest (c_i + c_j)/2 - w_ij of the particle's support; velocity and energy are the
     predicted ones.
