@@ -125,7 +125,7 @@ def scene_of(places, speeds, energy, boundary="open", **physics):
         "speeds": np.asarray(speeds).tolist(),
         "energies": np.full(n, energy).tolist(),
     }
-    physics = configuration.Physics(**(config.physics.model_dump() | physics))
+    physics = type(config.physics)(**(config.physics.model_dump() | physics))
     return Scene(dataclasses.replace(config, problem=Placed(**settings), physics=physics))
 
 

@@ -8,18 +8,22 @@ import numpy as np
 import pytest
 
 from sph import config as configuration
-from sph import runner
+from sph import restarting, runner
 from sph.analysis import summary
 from sph.integrators.step_size import StepLimit
 from sph.output.history import History
 from sph.output.history import read as read_history
 from sph.output.run_directory import RunDirectory
+from sph.part import Part
 from sph.runner import Runner
-from sph.totals import Totals
+from sph.scene import Scene
+from sph.simulation import Simulation
+from sph.totals import Baseline, Budget, Totals
 
 CONFIG = configuration.from_text('[problem]\nname = "kelvin_helmholtz"\nn = 100\n')
 TOTALS = Totals(
-    kinetic_energy=1.0, kinetic_energy_without_bulk=2.0, internal_energy=3.0, potential_energy=4.0,
+    kinetic_energy=1.0, kinetic_energy_without_bulk=2.0, internal_energy=3.0,
+    energies={"potential_energy": 4.0},
     momentum=np.array([5.0, 6.0]), volume=7.0, min_density=8.0, max_density=9.0,
     min_internal_energy=10.0, max_internal_energy=11.0, rates=12.0,
 )  # fmt: skip
@@ -49,12 +53,13 @@ class Clock:
 @pytest.fixture
 def simulation():
     scene = SimpleNamespace(
-        config=CONFIG, max_support=math.inf, is_filled=False, external=None, heating=None
-    )
+        config=CONFIG, max_support=math.inf, is_filled=False, adds_energy=False, all_parts=(),
+        columns=(), physics=CONFIG.physics,
+    )  # fmt: skip
     return SimpleNamespace(
         step=20, steps_here=15, time=0.25, limit=StepLimit(0.125, 17, "energy"), totals=TOTALS,
         energy_drift=-0.01, energy_injected=13.0, energy_added=14.0, held_supports=3,
-        volume_ratio=0.97, list_builds=6, clock=Clock(), scene=scene,
+        volume_ratio=0.97, columns=dict, list_builds=6, clock=Clock(), scene=scene,
         team=SimpleNamespace(threads=2),
         particles=SimpleNamespace(
             number=100, position=np.ones((2, 4)), velocity=np.ones((2, 4)), mass=np.ones(4),
@@ -99,42 +104,109 @@ def test_a_row_of_the_history_has_each_sum_in_its_column(session, simulation):
     assert simulation.clock.phases == ["diagnostics"]
 
 
+PULL = 'physics.external={ name = "point_mass", mass = 1.0 }'
+HEATING = 'physics.heating={ name = "relaxation", energy = 1.0, time = 0.1 }'
 OF_SOME_RUNS = {
-    "held_supports": ("max_support", 1.0, 3),
-    "volume_ratio": ("is_filled", True, 0.97),
-    "potential_energy": ("external", "a field", 4.0),
-    "energy_added": ("heating", "a source", 14.0),
+    "held_supports": ("problem.boundary=open", 3),
+    "volume_ratio": ("problem.boundary=periodic", 3.5),  # 7 of a box of 2
+    "potential_energy": (PULL, 4.0),
+    "energy_added": (HEATING, 14.0),
 }
+# A box of 1 by 2 whose scene has none of them.
+NONE_OF_THEM = configuration.from_text(
+    '[problem]\nname = "uniform"\ndimension = 2\nn = 100\nvelocity = [0.0, 0.0]\n'
+    'domain = [[0.0, 1.0], [0.0, 2.0]]\nboundary = ["mirror", "open"]\n'
+)
+
+
+def counted(simulation, *overrides):
+    """Give the stand-in the scene of these settings, and what `Simulation.columns` makes of it."""
+    scene = Scene(NONE_OF_THEM.override(overrides))
+    simulation.scene = scene
+    simulation.volume_ratio = simulation.totals.volume / scene.domain.volume
+    simulation.columns = lambda: Simulation.columns(simulation)
+    return scene.columns
 
 
 @pytest.mark.parametrize("column", OF_SOME_RUNS)
 def test_columns_of_some_scenes_are_there_where_they_mean_something(session, simulation, column):
-    name, value, expected = OF_SOME_RUNS[column]
-    setattr(simulation.scene, name, value)
+    setting, expected = OF_SOME_RUNS[column]
+    assert counted(simulation) == ()
+    assert simulation.columns() == {}
+    assert counted(simulation, setting) == (column,)
+    assert simulation.columns() == {column: expected}
     assert recorded(session(extra=[column])) == OF_EVERY_RUN | {column: expected}
-    assert runner._of_the_scene(simulation) == {column: expected}
 
 
-def test_what_was_counted_before_a_restart_is_taken_from_the_last_row(session, simulation):
-    begun = []
-    simulation.go_on_from = begun.append
+def test_a_part_may_have_columns_of_its_own(session, simulation):
+    class Turning(Part):
+        columns = ("turning_energy", "turns")
+
+        def sums(self, state):
+            return {"turns": float(state.mass.sum())}
+
+    counted(simulation)
+    parts = (*simulation.scene.all_parts, Turning())
+    simulation.scene.__dict__["all_parts"] = parts  # a cached property
+    del simulation.scene.__dict__["columns"]
+    simulation.totals = TOTALS._replace(energies={"turning_energy": 0.5})
+    expected = {"turning_energy": 0.5, "turns": 4.0}
+    assert simulation.columns() == expected
+    # the energy belongs to the total
+    assert recorded(session(extra=[*expected])) == OF_EVERY_RUN | expected | {"total_energy": 4.5}
+
+
+def test_seconds_of_earlier_sessions_are_taken_from_the_last_row(session, simulation):
     past = [
-        {"wall_seconds": 1.0, "cpu_seconds": 1.5, "energy_injected": 0.5, "energy_added": 0.25,
-         "kinetic_energy_without_bulk": 30.0, "internal_energy": 40.0},
-        {"wall_seconds": 4.0, "cpu_seconds": 6.0, "energy_injected": 0.75, "energy_added": -0.5},
-    ]  # fmt: skip
-    one = session(past, extra=["energy_added"])
+        {"wall_seconds": 1.0, "cpu_seconds": 1.5},
+        {"wall_seconds": 4.0, "cpu_seconds": 6.0, "energy_injected": 0.75},
+    ]
+    one = session(past)
     one._closing = contextmanager(lambda: (yield))
     one._to_end = lambda: "ended"
     assert one.from_checkpoint() == "ended"
-    assert (simulation.energy_injected, simulation.energy_added) == (0.75, -0.5)
-    assert [baseline.energy for baseline in begun] == [70.0]
+    assert simulation.energy_injected == 13.0  # which the checkpoint has
     assert len(one.past()["step"]) == 2  # the checkpoint's row is there
-    simulation.scene.heating = "a source"
     one._record()
     one.history.flush()
     # 4 + 2 and 6 + 3
     assert (one.past()["wall_seconds"][-1], one.past()["cpu_seconds"][-1]) == (6.0, 9.0)
+
+
+@pytest.fixture
+def place(tmp_path):
+    """place(*rows): a run directory whose history has these rows of `OF_EVERY_RUN` changed."""
+    directory = RunDirectory(tmp_path)
+
+    def made(*rows, extra=("energy_added",)):
+        history = History.create(directory.history, 2, [*extra])
+        for row in rows:
+            start = OF_EVERY_RUN | {"wall_seconds": 1.0, "cpu_seconds": 1.5}
+            history.append(start | row)
+        history.close()
+        return directory
+
+    return made
+
+
+def test_a_checkpoint_without_a_budget_takes_that_of_its_row(place):
+    """What it injected and added is of the checkpoint's step, its baseline of the first row."""
+    directory = place(
+        {"step": 0, "energy_injected": 0.5, "energy_added": 0.25,
+         "kinetic_energy_without_bulk": 30.0, "internal_energy": 40.0},
+        {"step": 5, "energy_injected": 0.75, "energy_added": -0.5},
+        {"step": 9, "energy_injected": 9.0, "energy_added": 9.0},
+    )  # fmt: skip
+    found = restarting._budget(SimpleNamespace(budget=None, step=5), directory)
+    assert found == Budget(0.75, -0.5, Baseline(70.0, 70.0))
+    kept = Budget(1.0, 2.0, Baseline(3.0, 4.0))
+    assert restarting._budget(SimpleNamespace(budget=kept, step=5), directory) is kept
+
+
+def test_a_checkpoint_without_a_budget_and_without_a_history_has_none(place, tmp_path):
+    lone = SimpleNamespace(budget=None, step=5)
+    assert restarting._budget(lone, RunDirectory(tmp_path)) is None
+    assert restarting._budget(lone, place(extra=())) is None
 
 
 def test_a_lone_checkpoint_begins_its_history(session, simulation):
@@ -237,7 +309,8 @@ def test_a_stop_writes_a_checkpoint_unless_there_is_one_and_names_the_last(
         closing._stop("SIGTERM")
     assert len(written) == number - 3
     last = closing.directory.checkpoint_path(number - 1)
-    assert f"stopped by SIGTERM at t = 0.25, step 20, with {last}." in str(caught.value)
+    assert "SIGTERM at t = 0.25, step 20" in str(caught.value)
+    assert f"{last}." in str(caught.value)
     assert closing.told[0][1]["reason"] == "SIGTERM"
     assert closing.told[0][1]["status"] == "stopped"
 
@@ -245,7 +318,7 @@ def test_a_stop_writes_a_checkpoint_unless_there_is_one_and_names_the_last(
 def test_a_run_shows_each_step_from_where_it_begins_to_its_end(closing, simulation, monkeypatch):
     shown = []
     closing.config = CONFIG.override(["time.end=0.5", "output.interval=0.125"])
-    simulation.scene.step_bounds = SimpleNamespace(held=(CONFIG.physics.C, "signal_speed"))
+    simulation.scene.step_bounds = SimpleNamespace(courant=CONFIG.physics.C)
 
     def advance(until):
         simulation.time, simulation.step = min(until, simulation.time + 0.0625), simulation.step + 1
@@ -278,7 +351,7 @@ def test_a_session_hears_nothing_from_numpy_and_says_where_threads_are_too_many(
             clock.on_compilation()
         assert clock.cpu >= 0.0
     assert [note.partition(" ")[0] for note in notes] == ["compiling", "run.threads", "compiling"]
-    assert "may use 7 processor" in notes[1]
+    assert " 7 processor" in notes[1]
     assert runner.threads_of(CONFIG.override(["run.threads=all"])) == 7
     assert runner.threads_of(CONFIG.override(["run.threads=3"])) == 3
 

@@ -58,6 +58,29 @@ def test_mirror_turns_particles_back():
         np.testing.assert_array_equal(velocity[1], speed)
 
 
+def test_mirror_turns_the_mixed_components_of_a_tensor():
+    """A tensor is turned on both sides: T'_ab = s_a s_b T_ab, with s = -1 along the walls met."""
+    random = np.random.default_rng(4)
+    position = np.array([[0.5, 1.5, 0.5, -1.5], [0.2, 0.2, 0.6, -0.1], [3.0, 3.0, 3.0, 6.0]])
+    signs = np.array([[1, -1, 1, -1], [1, 1, -1, -1], [1, 1, 1, 1]])
+    vector, tensor = random.normal(size=(3, 4)), random.normal(size=(3, 3, 4))
+    expected = signs * vector, signs[:, None] * signs * tensor
+    Domain(BOX, ("mirror", "mirror", "open")).bring_inside(position, [vector, tensor])
+    np.testing.assert_array_equal(vector, expected[0])
+    np.testing.assert_array_equal(tensor, expected[1])
+    # of a particle past a wall along x, T_xx and T_yy stay, T_xy and T_yx turn
+    line = np.array([[2.5]])
+    alone = np.array([[[7.0]]])
+    Domain(BOX[:1], ("mirror",)).bring_inside(line, [alone])
+    assert alone[0, 0, 0] == 7.0
+    # periodic axes leave it
+    position, before = np.array([[1.5], [0.2]]), random.normal(size=(2, 2, 1))
+    wrapped = before.copy()
+    Domain(BOX[:2], ("periodic", "mirror")).bring_inside(position, [wrapped])
+    assert position[0, 0] == -0.5
+    np.testing.assert_array_equal(wrapped, before)
+
+
 def test_open_axis_lets_go():
     position = np.array([[-9.0, 9.0]])
     Domain(BOX[:1], ("open",)).bring_inside(position, [])

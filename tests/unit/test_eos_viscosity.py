@@ -4,9 +4,12 @@ import numpy as np
 import pytest
 from numba import njit
 
-from sph import conductivity, eos, registry, viscosity
+from sph import eos, registry
 from sph.compiled import COMPILED
+from sph.formulations.gas import terms
+from sph.parts.conductivity._contacts import share
 from sph.parts.viscosity import balsara, constant
+from sph.parts.viscosity._shocks import alpha_after
 from sph.parts.viscosity.switches import cullen_dehnen, morris_monaghan
 
 FEW_ROUNDINGS = 1e-14  # of some operations at 1e-16 each
@@ -115,7 +118,7 @@ def test_balsara_tells_compression_from_shear():
 
 @njit(**COMPILED)
 def _shares(h, laplacian, energy, signal_speed):
-    return conductivity.share(h, laplacian, energy, signal_speed)
+    return share(h, laplacian, energy, signal_speed)
 
 
 def test_conductivity_acts_where_the_energy_bends():
@@ -134,17 +137,15 @@ def _compiled(gas, model, limiter, density, energy, alpha, divergence):
     return (
         P,
         c,
-        viscosity.pair_alpha(model, alpha, 2.0 * alpha),
-        viscosity.alpha_rate(model, alpha, 0.2, c, divergence),
-        viscosity.balsara_factor(limiter, divergence, 0.7, c, 0.2),
+        terms.pair_alpha(model, alpha, 2.0 * alpha),
+        terms.alpha_rate(model, alpha, 0.2, c, divergence),
+        terms.balsara_factor(limiter, divergence, 0.7, c, 0.2),
     )
 
 
 @njit(**COMPILED)
 def _compiled_shock(model, alpha, dt, support, signal_speed, divergence, rate, shear, signs):
-    return viscosity.alpha_after(
-        model, alpha, dt, support, signal_speed, divergence, rate, shear, signs
-    )
+    return alpha_after(model, alpha, dt, support, signal_speed, divergence, rate, shear, signs)
 
 
 def test_compiled_code_finds_the_same_numbers():

@@ -114,7 +114,7 @@ def test_the_rates_of_a_step_see_the_energy_that_it_ends_with(begin):
     heated.advance(math.inf)
     expected = 18.0 + (u - 18.0) * math.exp(-dt / 0.01)
     # two products of rounding; work between pairs of a uniform gas is as small
-    assert heated._energy == pytest.approx(expected, rel=1e-12)
+    assert heated.particles.predicted_energy == pytest.approx(expected, rel=1e-12)
 
 
 def test_a_scene_without_them_has_neither(begin):

@@ -5,13 +5,17 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from sph import config as configuration
 from sph import faults
 from sph.domain import Domain
 from sph.integrators.step_size import Bounds, StepLimit
 from sph.neighbours.order import BLOCK
+from sph.part import Part
+from sph.parts.external import External
+from sph.scene import Scene
 
 
-def state(n=4, dimension=2, boundary="open", external=None, **changed):
+def state(n=4, dimension=2, boundary="open", parts=(), **changed):
     """A simulation at step 4 whose n particles have IDs from 11 on, the highest first."""
     arrays = {
         "id": np.arange(n)[::-1] + 11,
@@ -21,14 +25,15 @@ def state(n=4, dimension=2, boundary="open", external=None, **changed):
         "energy_rate": np.ones(n),
         "density": np.ones(n),
     }
-    totals = SimpleNamespace(kinetic_energy=1.0, internal_energy=1.0, potential_energy=0.0)
+    totals = SimpleNamespace(kinetic_energy=1.0, internal_energy=1.0, energies={})
     box = np.array([[0.0, 2.0]] * dimension)
     return SimpleNamespace(
         step=4, steps_here=1, time=0.5, totals=totals,
         particles=SimpleNamespace(**arrays | changed),
         scene=SimpleNamespace(
-            external=external, domain=Domain(box, (boundary,) * dimension),
-            step_bounds=Bounds(0.1, True, False, 1.0),
+            all_parts=parts, domain=Domain(box, (boundary,) * dimension),
+            physics=SimpleNamespace(C=0.1),
+            step_bounds=Bounds(0.1, "signal_speed", True, False, 1.0),
         ),
     )  # fmt: skip
 
@@ -37,6 +42,12 @@ def test_a_fault_says_when_what_and_what_to_try():
     error = faults.fault(state(), "it broke", "another way", 7)
     assert str(error) == "step 4, t = 0.5: it broke.\nTry: another way."
     assert error.particle == 7
+
+
+class Strict(Part):
+    """A part that bounds the step of each particle, and says no more about that."""
+
+    name = "strict"
 
 
 def test_what_sets_a_step_is_its_particle_and_criterion():
@@ -48,15 +59,24 @@ def test_what_sets_a_step_is_its_particle_and_criterion():
         "viscosity": "physics.alpha",
         "conductivity": "strength of physics.conductivity",
         "approach": "approach",
+        "strict": "physics.strict",
     }
-    assert set(words) == set(faults.SETS)
+    text = '[problem]\nname = "uniform"\n[physics]\nconductivity = "approach"\n'
+    parts = (*Scene(configuration.from_text(text)).all_parts, Strict())
+    assert set(words) - set(faults.SETS) < {part.name for part in parts}
+    assert set(faults.SETS) < set(words)
+    simulation = state(parts=parts)
+
+    def said(criterion, particle=8):
+        simulation.limit = StepLimit(0.1, particle, criterion)
+        return faults.what_sets(simulation)
+
     for criterion, expected in words.items():
-        said = faults.what_sets(StepLimit(0.1, 8, criterion))
-        assert said.startswith("limited by particle 8 (")
-        assert expected in said
+        assert said(criterion).startswith("limited by particle 8 (")
+        assert expected in said(criterion)
         # no other criterion is told in these words
-        assert sum(expected in faults.what_sets(StepLimit(0.1, 8, one)) for one in words) == 1
-    assert "grow" in faults.what_sets(StepLimit(0.1, 0, "growth"))
+        assert sum(expected in said(one) for one in words) == 1
+    assert "grow" in said("growth", particle=0)
 
 
 def test_bad_values_are_counted_by_particle_and_the_first_is_named():
@@ -64,11 +84,11 @@ def test_bad_values_are_counted_by_particle_and_the_first_is_named():
     simulation = state(velocity=velocity)
     error = faults.fault_of(simulation, "velocity", velocity, ~np.isfinite(velocity), "-")
     assert error.particle == 12
-    assert "velocity of particle 12 at (0.25, 0.75) is [nan nan]; 2 particle(s)" in str(error)
+    assert "velocity of particle 12 at (0.25, 0.75) is [nan nan]; 2 particles" in str(error)
     density = np.array([1.0, -2.0, 1.0, 1.0])
     error = faults.fault_of(simulation, "density", density, density < 0.0, "-")
     assert error.particle == 13
-    assert "density of particle 13 at (0.125, 0.625) is -2.0; 1 particle(s)" in str(error)
+    assert "density of particle 13 at (0.125, 0.625) is -2.0; 1 particles" in str(error)
 
 
 def potential(position):
@@ -90,16 +110,34 @@ def potential(position):
 def test_a_sum_that_is_not_finite_is_told_with_the_particle_of_the_most(
     total, changed, name, particle
 ):
-    simulation = state(external=SimpleNamespace(potential=potential), **changed)
-    if total:
+    field = External(SimpleNamespace(potential=potential, softening=0.0))
+    simulation = state(parts=(Strict(), field), **changed)
+    simulation.totals.energies["potential_energy"] = 1.0
+    if total == "potential_energy":
+        simulation.totals.energies[total] = np.inf
+    elif total:
         setattr(simulation.totals, total, np.inf)
     error = faults.endless_sum(simulation)
     assert error.particle == particle
     assert f"total {name} is not finite" in str(error)
     assert f"particle {particle} at (" in str(error)
+    assert ("softening" in str(error)) == (total == "potential_energy")
     if total != "potential_energy":  # nor is it asked for where there is no field
-        simulation.scene.external = None
+        simulation.scene.all_parts = ()
         assert str(faults.endless_sum(simulation)) == str(error)
+
+
+def test_an_energy_without_a_remedy_of_its_part_is_told_with_that_of_all():
+    class Restless(Part):
+        def energies(self, state):
+            return {"rest_energy": potential(state.position)}
+
+    simulation = state(parts=(Restless(),))
+    simulation.totals.energies["rest_energy"] = np.nan
+    error = faults.endless_sum(simulation)
+    assert error.particle == 13
+    assert "the total rest energy " in str(error)
+    assert "physics.C" in str(error)
 
 
 def test_particles_without_neighbours_are_those_of_the_block():

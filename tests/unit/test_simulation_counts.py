@@ -9,14 +9,17 @@ import pytest
 from sph import config as configuration
 from sph import resolution, simulation, totals
 from sph.errors import NumericalError
+from sph.formulations.gas.density import density
+from sph.formulations.gas.rates import rates
 from sph.integrators import leapfrog, step_size
 from sph.integrators.step_size import StepLimit
 from sph.neighbours.order import BLOCK
 from sph.neighbours.search import Origin
-from sph.passes import contacts, density, rates, shocks
+from sph.parts.conductivity._contacts import contacts
+from sph.parts.viscosity._shocks import shocks
 from sph.scene import Scene
 from sph.simulation import Simulation
-from sph.totals import Baseline
+from sph.totals import Baseline, Budget
 
 # All that a step can have. Masses are of two kinds, so that a sum without them shows.
 ALL = """
@@ -70,18 +73,17 @@ def hollow(monkeypatch):
 
         def run(function, *_):
             called.setdefault(function, set()).add(clock.now)
-            if function is density.density:
-                one._wanted[:] = 0.0
-                one._wanted[one.asked.pop() if one.asked else []] = 1.0
+            if function is density:
+                one._sweep.wanted[:] = 0.0
+                one._sweep.wanted[one.asked.pop() if one.asked else []] = 1.0
 
-        one.team = SimpleNamespace(run=run)
+        one._sweep.team = SimpleNamespace(run=run)
         n, sums = one.particles.number, SimpleNamespace(volume=1.0)
         for name, result in (("order", np.arange(n)), ("guess", np.ones(n)), ("skin_for", 0.1),
                              ("build", None), ("stale", True), ("widen", None)):  # fmt: skip
             replace(one.search, name, result)
         one.search.origin = Origin(one.particles.position, np.ones(n), 0.1)
-        for name, result in (("predict", None), ("predict_energy", 5.0), ("predict_scalar", None),
-                             ("correct", None), ("correct_energy", 7.0)):  # fmt: skip
+        for name, result in (("keep", None), ("predict", 5.0), ("correct", 7.0)):
             replace(leapfrog, name, result)
         for name in ("limit", "before_contact"):
             replace(step_size, name, StepLimit(0.125, 1, "signal_speed"))
@@ -103,14 +105,12 @@ PHASES = {
     "guess": "lists",
     "build": "lists",
     "widen": "lists",
-    density.density: "density",
-    shocks.shocks: "viscosity",
-    contacts.contacts: "conductivity",
-    rates.rates: "rates",
+    density: "density",
+    shocks: "viscosity",
+    contacts: "conductivity",
+    rates: "rates",
     "predict": "predict, correct",
-    "predict_energy": "predict, correct",
     "correct": "predict, correct",
-    "correct_energy": "predict, correct",
     "stale": "predict, correct",
     "of": "step size, sums",
     "limit": "step size, sums",
@@ -143,7 +143,8 @@ def test_energies_add_up_over_the_steps(hollow):
     p, lost = one.particles, 0.25
     # cooling that takes as much from every particle in every half step
     source = SimpleNamespace(heated=lambda energy, dt: energy - lost * (dt == 0.0625))
-    object.__setattr__(one.scene, "heating", source)
+    (heating,) = (part for part in one.scene.parts if part.name == "heating")
+    heating.source = source
     assert np.ptp(p.mass) > 0.0
     for step in (1, 2, 3):
         one.advance(np.inf)
@@ -168,11 +169,12 @@ def test_steps_and_time_go_on_from_a_checkpoint_and_steps_here_begin_anew(hollow
 def test_a_drift_is_measured_from_the_baseline_without_what_heating_added(hollow):
     one = hollow()
     one.totals = SimpleNamespace(energy_without_bulk=7.0)
-    one.energy_added = 2.0
-    baseline = Baseline.of(1.0, 3.0, 0.0)
-    one.go_on_from(baseline)
-    assert one.baseline is baseline
+    budget = Budget(injected=3.0, added=2.0, baseline=Baseline.of(1.0, 3.0, 0.0))
+    one.go_on_from(budget)
+    assert (one.energy_injected, one.energy_added) == (3.0, 2.0)
+    assert one.baseline is budget.baseline
     assert one.energy_drift == 0.25  # (7 - 2 - 4)/4
+    assert one.budget == budget  # which the next restart goes on from
 
 
 def test_supports_that_are_held_are_counted_at_every_look(hollow):
@@ -180,14 +182,17 @@ def test_supports_that_are_held_are_counted_at_every_look(hollow):
     one.particles.support[:] = 1.0
     one.particles.support[[3, 5]] = 2.0
     one.particles.density[:] = 1.0
+    domain = one.scene.domain
+    one.scene = SimpleNamespace(max_support=2.0)
     for _ in range(2):
-        one._check_found(SimpleNamespace(max_support=2.0))
+        one._check_found()
         assert one.held_supports == 2
-    one._check_found(SimpleNamespace(max_support=np.inf))
+    one.scene = SimpleNamespace(max_support=np.inf, domain=domain)
+    one._check_found()
     assert one.held_supports == 2  # nothing is held, and nothing is counted
     one.particles.density[3] = -1.0
     with pytest.raises(NumericalError) as caught:
-        one._check_found(SimpleNamespace(max_support=2.0))
+        one._check_found()
     assert caught.value.particle == one.particles.id[3]
 
 
@@ -195,8 +200,9 @@ def test_lists_that_are_never_wide_enough_name_their_block(hollow):
     one = hollow()
     one.asked = [[2]] * 1000
     with pytest.raises(NumericalError) as caught:
-        one._density(one.scene.formulation.models)
+        one._make(one.scene.passes[0])
     assert caught.value.particle == one.particles.id[2 * BLOCK]
+    assert len(one.asked) == 1000 - simulation.MAX_WIDENINGS
 
 
 def test_the_volume_of_the_particles_is_over_that_of_a_filled_box(hollow):
@@ -209,12 +215,20 @@ def test_the_volume_of_the_particles_is_over_that_of_a_filled_box(hollow):
 
 def test_a_checkpoint_gives_the_next_step_and_no_particle_for_it(hollow):
     whole = hollow()
+    whole_baseline = Baseline.at(None, 0.0)  # its stand-in
     scene, particles, clock = whole.scene, whole.particles, whole.clock
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(simulation.Search, "build", lambda *_: None)
         origin = Origin(particles.position, np.ones(particles.number), 0.1)
-        one = Simulation.resume(scene, particles, 2.0, 40, 0.0625, origin, 1, clock)
+        resumed = scene, particles, 2.0, 40, 0.0625, origin, 1, clock
+        one = Simulation.resume(*resumed)
+        budget = Budget(3.0, 2.0, SimpleNamespace(drift=lambda totals, added: 10.0 * added))
+        other = Simulation.resume(*resumed, budget)
     assert (one.time, one.step, one.steps_here) == (2.0, 40, 0)
     assert one.limit == StepLimit(0.0625, 0, "checkpoint")
     assert (one.energy_added, one.energy_injected) == (0.0, 0.0)
-    one.close()
+    assert one.budget.baseline is whole_baseline  # begun anew
+    assert (other.energy_added, other.energy_injected, other.energy_drift) == (2.0, 3.0, 20.0)
+    assert other.budget == budget
+    for each in (one, other):
+        each.close()

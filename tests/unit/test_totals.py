@@ -6,6 +6,8 @@ from states import gas_state
 
 from sph import config as configuration
 from sph import totals
+from sph.part import Part
+from sph.parts.external import External
 from sph.parts.external.point_mass import PointMass
 from sph.totals import Baseline
 
@@ -22,12 +24,19 @@ def gas(dimension=2, n=50, boost=0.0):
     return particles
 
 
+class Resting(Part):
+    """A second part that has an energy."""
+
+    def energies(self, state):
+        return {"rest_energy": np.full(state.number, 9.0)}
+
+
 @pytest.mark.parametrize("boost", [0.0, 1e-3, 1.0, 1e3, 1e6])
 def test_kinetic_energy_without_bulk_is_the_same_in_every_frame(boost):
     particles = gas()
-    still = totals.of(particles, None, np.ones(2))
+    still = totals.of(particles, (), np.ones(2))
     particles.velocity += np.array([[boost], [-0.3 * boost]])
-    moving = totals.of(particles, None, np.ones(2))
+    moving = totals.of(particles, (), np.ones(2))
     # velocities round at 1e-16 of the boost, and their errors add up at random
     assert moving.kinetic_energy_without_bulk == pytest.approx(
         still.kinetic_energy_without_bulk, rel=1e-14 + 1e-15 * boost
@@ -39,9 +48,9 @@ def test_kinetic_energy_without_bulk_is_the_same_in_every_frame(boost):
 
 def test_axes_that_do_not_keep_momentum_keep_their_bulk_motion():
     particles = gas(boost=5.0)
-    none = totals.of(particles, None, np.zeros(2))
+    none = totals.of(particles, (), np.zeros(2))
     assert none.kinetic_energy_without_bulk == pytest.approx(none.kinetic_energy, rel=1e-14)
-    along_y = totals.of(particles, None, np.array([0.0, 1.0]))
+    along_y = totals.of(particles, (), np.array([0.0, 1.0]))
     bulk = none.momentum[1] / particles.mass.sum()
     expected = none.kinetic_energy - 0.5 * particles.mass.sum() * bulk**2
     assert along_y.kinetic_energy_without_bulk == pytest.approx(expected, rel=1e-13)
@@ -50,7 +59,7 @@ def test_axes_that_do_not_keep_momentum_keep_their_bulk_motion():
 def test_volume_is_the_sum_of_mass_over_density():
     particles = gas(dimension=3)
     expected = (particles.mass / particles.density).sum()
-    assert totals.of(particles, None, np.ones(3)).volume == pytest.approx(expected, rel=1e-14)
+    assert totals.of(particles, (), np.ones(3)).volume == pytest.approx(expected, rel=1e-14)
 
 
 def test_every_sum_and_extreme_is_that_of_its_particles():
@@ -58,31 +67,32 @@ def test_every_sum_and_extreme_is_that_of_its_particles():
     particles.acceleration[:] = RANDOM.normal(size=(3, 50))
     particles.energy_rate[:] = RANDOM.normal(size=50)
     p, field = particles, PointMass(2.0, 0.1)
-    found = totals.of(p, field, np.ones(3))
+    found = totals.of(p, (External(field), Resting()), np.ones(3))
     expected = {
         "kinetic_energy": 0.5 * p.mass @ (p.velocity**2).sum(axis=0),
         "internal_energy": p.mass @ p.internal_energy,
-        "potential_energy": p.mass @ field.potential(p.position),
+        "energies": {"potential_energy": p.mass @ field.potential(p.position),
+                     "rest_energy": 9.0 * p.mass.sum()},
         "min_density": p.density.min(),
         "max_density": p.density.max(),
         "min_internal_energy": p.internal_energy.min(),
         "max_internal_energy": p.internal_energy.max(),
         "rates": p.acceleration.sum() + p.energy_rate.sum(),
-    }
+    }  # fmt: skip
     # sums of 50 to 200 terms in another order, those of the rates with either sign
-    assert {name: getattr(found, name) for name in expected} == pytest.approx(
-        expected, rel=1e-13, abs=1e-13
-    )
+    for name, value in expected.items():
+        assert getattr(found, name) == pytest.approx(value, rel=1e-13, abs=1e-13)
+    assert found.potential_energy == pytest.approx(sum(expected["energies"].values()), rel=1e-13)
     assert found.momentum == pytest.approx(p.velocity @ p.mass, rel=1e-12)
     parts = found.internal_energy + found.potential_energy
     assert found.energy == pytest.approx(found.kinetic_energy + parts, rel=1e-15)
     without_bulk = found.kinetic_energy_without_bulk + parts
     assert found.energy_without_bulk == pytest.approx(without_bulk, rel=1e-15)
-    assert totals.of(p, None, np.ones(3)).potential_energy == 0.0
+    assert totals.of(p, (Part(),), np.ones(3)).potential_energy == 0.0
 
 
 def test_a_baseline_in_the_middle_of_a_run_has_drifted_by_nothing():
-    now = totals.of(gas(), PointMass(2.0, 0.1), np.ones(2))
+    now = totals.of(gas(), (External(PointMass(2.0, 0.1)),), np.ones(2))
     baseline = Baseline.at(now, added=0.5)
     assert abs(baseline.drift(now, added=0.5)) < 1e-15  # round-off
     assert baseline.drift(now, added=0.0) == pytest.approx(0.5 / baseline.scale, rel=1e-12)
@@ -100,9 +110,9 @@ def test_a_baseline_in_the_middle_of_a_run_has_drifted_by_nothing():
 )
 def test_drift_is_relative_to_what_there_was(kinetic, internal, potential, scale):
     baseline = Baseline.of(kinetic, internal, potential)
-    now = totals.of(gas(), None, np.ones(2))._replace(
+    now = totals.of(gas(), (), np.ones(2))._replace(
         kinetic_energy_without_bulk=kinetic + 0.3, internal_energy=internal + 0.25,
-        potential_energy=potential,
+        energies={"potential_energy": potential},
     )  # fmt: skip
     # a quarter was added by heating, which is no drift
     assert baseline.drift(now, added=0.25) == pytest.approx(0.3 / scale, rel=1e-13)
@@ -110,7 +120,7 @@ def test_drift_is_relative_to_what_there_was(kinetic, internal, potential, scale
 
 def test_gas_without_any_energy_drifts_endlessly_or_not_at_all():
     nothing = Baseline.of(0.0, 0.0, 0.0)
-    now = totals.of(gas(), None, np.ones(2))._replace(
+    now = totals.of(gas(), (), np.ones(2))._replace(
         kinetic_energy_without_bulk=0.0, internal_energy=0.0
     )
     assert nothing.drift(now, 0.0) == 0.0

@@ -10,9 +10,12 @@ import numpy as np
 import pytest
 
 from sph import config as configuration
-from sph import faults, watchdog
+from sph import faults, parts, watchdog
 from sph.errors import ConfigError, NumericalError
+from sph.formulations.gas import Gas
 from sph.integrators import leapfrog, step_size
+from sph.part import Part
+from sph.parts.viscosity import Viscosity
 from sph.scene import Scene
 
 TUBE = """
@@ -113,7 +116,7 @@ def test_large_alpha_and_large_courant_numbers_are_held(begin, monkeypatch, stif
         return abs(simulation.totals.energy / before - 1)
 
     assert drift() < 1e-3  # the problem's limit; 2e-4 was the most
-    monkeypatch.setattr(step_size.Bounds, "held", property(lambda b: (b.courant, "signal_speed")))
+    monkeypatch.setattr(Viscosity, "largest_courant", Part.largest_courant)
     assert drift() > 0.02
 
 
@@ -169,12 +172,24 @@ def test_what_to_try_where_steps_are_too_short_is_not_shorter_ones(
 
 
 def test_every_criterion_has_words():
-    for criterion in step_size.CRITERIA:
+    text = TUBE.format(boundary="mirror")
+    settings = [
+        'physics.heating={name="relaxation",energy=20.0,time=0.01}',
+        'physics.external={name="point_mass",mass=1.0}',
+        "physics.conductivity=approach",
+    ]
+    scene = Scene(configuration.from_text(text).override(settings))
+
+    def words(particle, criterion):
+        limit = step_size.StepLimit(1.0, particle, criterion)
+        return faults.what_sets(SimpleNamespace(scene=scene, limit=limit))
+
+    assert len(scene.parts) == len(parts.classes("gas"))
+    for criterion in (*step_size.CRITERIA, *(part.name for part in scene.parts)):
         particle = 0 if criterion in ("growth", "end") else 7
-        words = faults.what_sets(step_size.StepLimit(1.0, particle, criterion))
-        assert ("by particle 7" in words) == (particle == 7)
-    assert "checkpoint" in faults.what_sets(step_size.StepLimit(1.0, 0, "checkpoint"))
-    assert "box" in faults.what_sets(step_size.StepLimit(1.0, 0, "approach"))
+        assert ("by particle 7" in words(particle, criterion)) == (particle == 7)
+    assert "checkpoint" in words(0, "checkpoint")
+    assert "box" in words(0, "approach")
 
 
 @pytest.mark.parametrize(("drift", "is_wrong"), [(0.03, True), (-0.03, True), (0.01, False)])
@@ -273,8 +288,8 @@ def test_a_step_that_collapses(begin, monkeypatch):
         simulation.advance(math.inf)
     allowed = step_size.limit
 
-    def shrunk(bounds, particles, signals, divergence, past):
-        limit = allowed(bounds, particles, signals, divergence, None)
+    def shrunk(bounds, particles, parts, past):
+        limit = allowed(bounds, particles, parts, None)
         return limit._replace(dt=1e-9 * limit.dt)
 
     monkeypatch.setattr(step_size, "limit", shrunk)
@@ -340,14 +355,8 @@ def test_without_its_rule_internal_energy_becomes_negative(begin, monkeypatch):
     assert simulation.particles.internal_energy.min() > 0
     assert simulation.energy_injected > 0
 
-    def straight(dt, energy, rate, mass, full=None):
-        if full is not None:
-            full[:] = energy + rate * dt
-        energy += 0.5 * rate * dt
-        return 0.0
-
-    monkeypatch.setattr(leapfrog, "predict_energy", straight)
-    monkeypatch.setattr(leapfrog, "correct_energy", straight)
+    unruly = tuple(one._replace(rule=leapfrog.STRAIGHT) for one in Gas.evolved)
+    monkeypatch.setattr(Gas, "evolved", unruly)
     with pytest.raises(NumericalError):
         run(begin(*PARTING, boundary="open"), 0.03)
 
@@ -420,7 +429,7 @@ def test_a_liquid_torn_apart_is_named_and_not_an_ideal_gas(begin):
 
 
 def test_without_that_guard_the_liquid_is_a_number_that_is_none(begin, monkeypatch):
-    monkeypatch.setattr(watchdog.Watchdog, "_check_gas", lambda self, simulation: None)
+    monkeypatch.setattr(Gas, "check", Part.check)
     with pytest.raises(NumericalError, match="acceleration"):
         begin(LIQUID, boundary="open")
 

@@ -5,9 +5,11 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from sph import config as configuration
 from sph import watchdog
 from sph.errors import NumericalError
 from sph.integrators import step_size
+from sph.scene import Scene
 
 
 def quiet(**changed):
@@ -18,18 +20,17 @@ def quiet(**changed):
         "velocity": np.zeros((2, n)), "internal_energy": np.ones(n), "density": np.ones(n),
         "acceleration": np.zeros((2, n)), "energy_rate": np.zeros(n),
     } | changed  # fmt: skip
-    config = SimpleNamespace(
-        physics=SimpleNamespace(max_energy_drift=0.02, C=0.1), time=SimpleNamespace(end=0.25)
-    )
+    physics = SimpleNamespace(max_energy_drift=0.02, C=0.1)
+    config = SimpleNamespace(physics=physics, time=SimpleNamespace(end=0.25))
     domain = SimpleNamespace(box=np.array([[0.0, 1.0], [0.0, 2.0]]), boundaries=("mirror", "open"))
     totals = SimpleNamespace(
-        energy=1.0, kinetic_energy=0.0, internal_energy=1.0, potential_energy=0.0, max_density=1.0,
+        energy=1.0, kinetic_energy=0.0, internal_energy=1.0, energies={}, max_density=1.0,
         min_density=1.0, min_internal_energy=1.0, rates=0.0,
     )  # fmt: skip
     return SimpleNamespace(
         scene=SimpleNamespace(
-            config=config, domain=domain, eos=None, external=None,
-            step_bounds=step_size.Bounds(0.1, False, False, 0.25),
+            config=config, physics=physics, domain=domain, all_parts=(),
+            step_bounds=step_size.Bounds(0.1, "signal_speed", False, False, 0.25),
         ),
         particles=SimpleNamespace(**arrays), totals=totals, energy_drift=0.0, volume_ratio=None,
         limit=step_size.StepLimit(1e-3, 12, "signal_speed"), time=0.0, step=5,
@@ -125,8 +126,12 @@ def test_what_a_run_begins_with_is_not_cured_by_smaller_steps():
 
 @pytest.mark.parametrize(("above", "is_torn"), [(1e-9, False), (0.0, True), (-1e-9, True)])
 def test_gas_is_torn_where_sound_has_no_speed(above, is_torn):
+    liquid = '[problem]\nname = "uniform"\n[physics]\n'
+    liquid += 'eos = { name = "stiffened_gas", gamma = 4.4, p_inf = 1.0 }\n'
+    gas = Scene(configuration.from_text(liquid)).formulation
+    gas.eos = SimpleNamespace(lowest_energy=lambda density: 0.25 * density)
     state = quiet(density=np.array([1.0, 1.0, 2.0, 1.0]))
-    state.scene.eos = SimpleNamespace(lowest_energy=lambda density: 0.25 * density)
+    state.scene.all_parts = (gas,)
     state.particles.internal_energy[2] = 0.5 + above
     error = refusal(state)
     assert (error is not None) == is_torn
