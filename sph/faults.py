@@ -123,7 +123,7 @@ def fault_of(simulation, name: str, values, bad, remedy: str) -> NumericalError:
     return fault(
         simulation,
         f"{name} of particle {p.id[i]} at {_place(p, i)} is {values[..., i]}; "
-        f"{count} particles affected",
+        f"{count} particle{'s' * (count != 1)} affected",
         remedy,
         int(p.id[i]),
     )

@@ -19,7 +19,7 @@ import numpy as np
 from llvmlite import binding
 
 import sph
-from sph import registry
+from sph import extensions as of_users
 
 # Settings of Numba that do not change compiled code: debugging output, paths, CUDA, the number of
 # threads (for parallel=True, which sph does not use). All others count, including those that a
@@ -40,7 +40,7 @@ def sources() -> str:
 
 def extensions() -> dict[str, str]:
     """Return the hash of the source files in `sph_extensions`, if there are any."""
-    hashes = [_hash_of_sources(Path(folder)) for folder in registry.extension_folders()]
+    hashes = [_hash_of_sources(Path(folder)) for folder in of_users.folders()]
     return {"sources of sph_extensions": " ".join(hashes)} if any(hashes) else {}
 
 

@@ -102,6 +102,9 @@ class Part:
     bounds_acceleration: bool = False  # whether |a| bounds the step
     adds_energy: bool = False  # whether `split` may
 
+    def __init_subclass__(cls) -> None:
+        cls.name = cls.__module__.rpartition(".")[2]
+
     # --- configuration ---
 
     @classmethod

@@ -1,20 +1,17 @@
 """Discovery of kernels, equations of state, schemes, parts and problems by folder.
 
-Users may add choices in a package `sph_extensions` on the Python path: a file
-sph_extensions/kernels/mine.py is found like sph/kernels/mine.py. This package has no __init__.py,
-so it may be spread over several directories.
+Users may add choices in a package `sph_extensions` on the Python path (`sph.extensions`): a file
+sph_extensions/kernels/mine.py is found like sph/kernels/mine.py.
 """
 
 import functools
 import importlib
-import importlib.util
 import pkgutil
 from types import ModuleType
 from typing import Any
 
+from sph import extensions
 from sph.part import Part
-
-EXTENSIONS = "sph_extensions"
 
 _known: dict[tuple, str] = {}  # modules of model classes, by what Numba tells them apart by
 
@@ -74,7 +71,6 @@ def part_class(package: str, name: str) -> type[Part]:
         for kind in vars(module).values()
         if isinstance(kind, type) and issubclass(kind, Part) and kind.__module__ == module.__name__
     )
-    found.name = name
     return found
 
 
@@ -92,24 +88,11 @@ def model(package: str, choice: str | dict[str, Any] | None, label: str = "name"
 def _places(package: str, folders: bool) -> dict[str, str]:
     """Return the package of each choice; those of sph have precedence over extensions."""
     found: dict[str, str] = {}
-    for place in (package, package.replace("sph", EXTENSIONS, 1)):
-        if place != package and not _exists(place):
+    for place in (package, extensions.counterpart(package)):
+        if not extensions.exists(place):
             continue
         for module in pkgutil.iter_modules(importlib.import_module(place).__path__):
             if (folders or not module.ispkg) and not module.name.startswith("_"):
                 found.setdefault(module.name, place)
     found.pop("base", None)
     return found
-
-
-def extension_folders() -> list[str]:
-    """The folders that make up `sph_extensions`, in the order of the Python path."""
-    spec = importlib.util.find_spec(EXTENSIONS)
-    return list(spec.submodule_search_locations or []) if spec else []
-
-
-def _exists(package: str) -> bool:
-    try:
-        return importlib.util.find_spec(package) is not None
-    except ModuleNotFoundError:  # of a package above it
-        return False

@@ -249,7 +249,7 @@ def test_a_bad_particle_is_named(begin, name, value):
     words = name.replace("_", " ")
     assert f"{words} of particle {simulation.particles.id[7]} at (" in str(caught.value)
     assert f"{value}" in str(caught.value)
-    assert "; 1 particles affected" in str(caught.value)
+    assert "; 1 particle affected" in str(caught.value)
     assert "Try: a smaller physics.C" in str(caught.value)
 
 
