@@ -52,6 +52,7 @@ def verb(stub: Verb) -> Verb:
     source = f"lambda {', '.join(parameters)}: pick({', '.join(parameters)})"
     found = eval(source, {"pick": pick})
     overload(stub, jit_options=INLINED)(found)  # type: ignore[arg-type]
+    stub.verb_parameters = parameters  # type: ignore[attr-defined]
     return stub
 
 

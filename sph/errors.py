@@ -16,6 +16,10 @@ class ConfigError(SphError):
     exit_code = 2
 
 
+class DeclarationError(ConfigError, TypeError):
+    """A file that adds a model or a part declares something wrongly; the message names the file."""
+
+
 class NumericalError(SphError):
     """The run produced NaNs or unphysical values.
 

@@ -4,7 +4,12 @@ The package mirrors the folders of sph: sph_extensions/kernels/mine.py is a kern
 __init__.py, so that several places may hold a share of it.
 """
 
+import importlib
 import importlib.util
+import traceback
+from types import ModuleType
+
+from sph.errors import DeclarationError
 
 PACKAGE = "sph_extensions"
 
@@ -20,6 +25,28 @@ def exists(package: str) -> bool:
         return importlib.util.find_spec(package) is not None
     except ModuleNotFoundError:  # of a package above it
         return False
+
+
+def load(module: str) -> ModuleType:
+    """Return a module of sph or of users.
+
+    Raises DeclarationError, which names file and line, if that of a user cannot be imported.
+    """
+    try:
+        return importlib.import_module(module)
+    except DeclarationError:
+        raise
+    except Exception as error:
+        if not module.startswith(f"{PACKAGE}."):
+            raise
+        if isinstance(error, SyntaxError):
+            where = f"{error.filename}, line {error.lineno}"
+        else:
+            frames = traceback.extract_tb(error.__traceback__)
+            inside = [one for one in frames if f"/{PACKAGE}/" in one.filename]
+            where = f"{inside[-1].filename}, line {inside[-1].lineno}" if inside else module
+        name = type(error).__name__
+        raise DeclarationError(f"{where}: cannot be imported: {name}: {error}") from error
 
 
 def folders() -> list[str]:

@@ -21,6 +21,12 @@ class Model:
     """
 
     name = ""  # of the file, as in the configuration
+    _is_model = True
+
+    @classmethod
+    def required(cls) -> tuple[str, ...]:
+        """Return the names of methods and parameters that a model of this folder must have."""
+        return ()
 
     def issues(self) -> list[tuple[str, str]]:
         """Return (parameter, message) for values that are valid by themselves but not together."""

@@ -85,6 +85,8 @@ class Part:
 
     name: ClassVar[str] = ""
     title: ClassVar[str] = ""  # in the lists of what is compiled in and left out
+    # Fields that it declares in some scenes only, and that no other part may declare in any.
+    reserves: ClassVar[tuple[str, ...]] = ()
     keys: ClassVar[tuple[Key, ...]] = ()
     formulations: ClassVar[tuple[str, ...]] = ()  # that it can join; empty: every one
     # Whether an exact solution without the part stays the solution with it (numerical terms do).
@@ -104,6 +106,7 @@ class Part:
 
     def __init_subclass__(cls) -> None:
         cls.name = cls.__module__.rpartition(".")[2]
+        cls.title = cls.title or cls.name.replace("_", " ")
 
     # --- configuration ---
 

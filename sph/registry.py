@@ -10,7 +10,8 @@ import pkgutil
 from types import ModuleType
 from typing import Any
 
-from sph import extensions
+from sph import declarations, extensions
+from sph.errors import DeclarationError
 from sph.part import Part
 
 _known: dict[tuple, str] = {}  # modules of model classes, by what Numba tells them apart by
@@ -26,51 +27,72 @@ def names(package: str, folders: bool = False) -> list[str]:
 
 
 def load(package: str, name: str, folders: bool = False) -> ModuleType:
-    """Return the module of that choice. Raises KeyError that names the valid choices."""
+    """Return the module of that choice.
+
+    Raises KeyError that names the valid choices, and DeclarationError for an extension that cannot
+    be imported.
+    """
     places = _places(package, folders)
     if name not in places:
         raise KeyError(f"no {name!r} in {package}; expected one of {', '.join(sorted(places))}")
-    return importlib.import_module(f"{places[name]}.{name}")
+    return extensions.load(f"{places[name]}.{name}")
 
 
 @functools.cache
 def model_class(package: str, name: str) -> type:
     """Return the NamedTuple that a model's file defines.
 
-    Raises TypeError if the class is not decorated with `sph.model.model`, or if another model has
-    equal class and field names: Numba distinguishes named tuples only by these, so both models
-    would share their formulas.
+    Raises DeclarationError if the class is declared wrongly, or if another model has equal class
+    and field names: Numba distinguishes named tuples only by these, so both models would share
+    their formulas.
     """
     module = load(package, name)
-    (found,) = (
-        kind
-        for kind in vars(module).values()
-        if isinstance(kind, type)
-        and hasattr(kind, "_fields")
-        and kind.__module__ == module.__name__
+    found: Any = declarations.only_class(
+        module,
+        (
+            kind
+            for kind in vars(module).values()
+            if isinstance(kind, type)
+            and hasattr(kind, "_fields")
+            and kind.__module__ == module.__name__
+        ),
+        "a NamedTuple",
     )
-    if not hasattr(found, "issues"):
-        raise TypeError(
+    if not hasattr(found, "_is_model"):
+        raise DeclarationError(
             f"{module.__name__}: decorate {found.__name__} with @model(Base) of sph.model, where "
             f"Base is the class in {package} that has what a model may leave out"
         )
+    declarations.check_model(found, importlib.import_module(package))
     other = _known.setdefault((found.__name__, found._fields), module.__name__)
     if other != module.__name__:
-        raise TypeError(
+        raise DeclarationError(
             f"{module.__name__} and {other} both define a model {found.__name__}"
             f"({', '.join(found._fields)}), which compiled code cannot distinguish. Try: rename one"
         )
     return found
 
 
+@functools.cache
 def part_class(package: str, name: str) -> type[Part]:
-    """Return the subclass of Part that the module of a part or formulation defines."""
+    """Return the subclass of Part that the module of a part or formulation defines.
+
+    Raises DeclarationError if the class is declared wrongly.
+    """
     module = load(package, name, folders=True)
-    (found,) = (
-        kind
-        for kind in vars(module).values()
-        if isinstance(kind, type) and issubclass(kind, Part) and kind.__module__ == module.__name__
+    base = importlib.import_module(package).BASE
+    found = declarations.only_class(
+        module,
+        (
+            kind
+            for kind in vars(module).values()
+            if isinstance(kind, type)
+            and issubclass(kind, base)
+            and kind.__module__ == module.__name__
+        ),
+        f"a subclass of {base.__name__}",
     )
+    declarations.check_part_class(found, optional=base is Part)
     return found
 
 

@@ -12,7 +12,7 @@ from sph import faults
 from sph.analysis import reference, summary
 from sph.clock import Clock
 from sph.config import Config
-from sph.errors import FileError, NumericalError, Stopped, first_line
+from sph.errors import DeclarationError, FileError, NumericalError, Stopped, first_line
 from sph.neighbours.search import Origin
 from sph.output import checkpoint as checkpoints
 from sph.output import offenders
@@ -101,6 +101,11 @@ def state_of(simulation: Simulation, lineage: tuple[str, ...] = ()) -> Checkpoin
 
 def new_history(config: Config, simulation: Simulation, directory: RunDirectory) -> History:
     extra = [*simulation.columns(), *config.problem.diagnostics(simulation.particles)]
+    if twice := sorted({name for name in extra if extra.count(name) > 1}):
+        raise DeclarationError(
+            f"the columns {', '.join(twice)} of the history are declared by a part and by the "
+            f"problem {config.problem.name}"
+        )
     return History.create(directory.history, config.problem.dimension, extra)
 
 
@@ -246,6 +251,7 @@ class Runner:
     def _write_checkpoint(self) -> None:
         """Flush the history, then write the checkpoint."""
         simulation = self.simulation
+        simulation.check_fields()
         path = self.directory.checkpoint_path(self.number)
         with simulation.clock.phase("output"):
             self.history.flush()

@@ -6,7 +6,7 @@ from functools import cached_property
 
 import numpy as np
 
-from sph import parts, registry
+from sph import declarations, parts, registry
 from sph.config import Config
 from sph.domain import Domain
 from sph.errors import ConfigError
@@ -43,17 +43,25 @@ class Scene:
     @cached_property
     def parts(self) -> tuple[Part, ...]:
         """The optional physics that the scene has."""
-        asked = (kind.of(self) for kind in parts.classes(self.physics.formulation))
-        return tuple(part for part in asked if part is not None)
+        asked = [(kind.of(self), kind) for kind in parts.classes(self.physics.formulation)]
+        there = [(part, kind) for part, kind in asked if part is not None]
+        for part, kind in there:
+            declarations.check_part(part, kind, optional=True)
+        return tuple(part for part, _ in there)
 
     @cached_property
     def formulation(self) -> Formulation:
-        return registry.part_class("sph.formulations", self.physics.formulation).of(self)
+        kind = registry.part_class("sph.formulations", self.physics.formulation)
+        found = kind.of(self)
+        declarations.check_part(found, kind, optional=False)
+        return found
 
     @cached_property
     def all_parts(self) -> tuple[Part, ...]:
-        """The formulation, then the other parts."""
-        return (self.formulation, *self.parts)
+        """The formulation, then the other parts. Raises DeclarationError."""
+        found = (self.formulation, *self.parts)
+        declarations.check_together(found, self.physics.kinds, self.formulation.roles)
+        return found
 
     @cached_property
     def fields(self) -> tuple[Field, ...]:

@@ -3,7 +3,7 @@
 import numpy as np
 from numba.core.registry import cpu_target
 
-from sph import faults, passes, resolution, totals
+from sph import declarations, faults, passes, resolution, totals
 from sph.clock import STARTING, Clock
 from sph.integrators import leapfrog, step_size
 from sph.neighbours.order import number_of_blocks
@@ -88,7 +88,9 @@ class Simulation:
             if one.widens:
                 resolution.check(self)
         self._sweep.models = self.scene.formulation.models
+        declarations.check_returned(self.scene.all_parts, self.particles)
         self._measure(past=None)
+        self.check_fields()
 
     @classmethod
     def resume(
@@ -105,6 +107,7 @@ class Simulation:
         with clock.phase("lists"):
             self.search.build(origin, particles.id)
         self._sweep.models = scene.formulation.models
+        declarations.check_returned(scene.all_parts, particles)
         self.totals = totals.of(particles, scene.all_parts, scene.keeps_momentum)
         anew = totals.Budget(0.0, 0.0, totals.Baseline.at(self.totals, 0.0))
         self.go_on_from(anew if budget is None else budget)
@@ -151,6 +154,11 @@ class Simulation:
         self.time = until if landing else self.time + dt
         self._measure(step_size.Past(dt, allowed))
 
+    def check_fields(self) -> None:
+        """Raise an error for a stored field that could not be read back from a checkpoint."""
+        declarations.check_arrays(self.scene.all_parts, self.particles)
+        self.watchdog.check_fields(self)
+
     @property
     def volume_ratio(self) -> float | None:
         """Sum of m/rho over the volume of the box; None unless gas fills a closed box."""
@@ -178,6 +186,9 @@ class Simulation:
             found["energy_added"] = self.energy_added
         for part in scene.all_parts:
             found |= part.sums(self.particles)
+        for name, value in found.items():
+            if not np.isfinite(value):  # a restart could not read the history
+                raise faults.fault(self, f"{name} is {value}", faults.of_numbers(self), 0)
         return {name: found[name] for name in scene.columns}
 
     def close(self) -> None:

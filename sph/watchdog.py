@@ -20,6 +20,7 @@ from sph.faults import (
     smaller_steps,
     what_sets,
 )  # fmt: skip
+from sph.state import COMMON
 
 # Number of steps over which progress in time is compared with the best earlier progress, and the
 # smallest ratio of both. Cold gas at a shock may need some hundred very short steps.
@@ -85,6 +86,24 @@ class Watchdog:
         self._check_fences(simulation)
         self._check_pace(simulation)
 
+    def check_fields(self, simulation) -> None:
+        """Raise NumericalError for values of stored fields that no checkpoint may hold.
+
+        Called before a checkpoint is written. Every step checks the fields of all formulations.
+        """
+        p = simulation.particles
+        for field in p.fields:
+            if field in COMMON or not field.stored:
+                continue
+            values = getattr(p, field.name)
+            bad = ~np.isfinite(values)
+            if field.above is not None:
+                bad |= ~(values > field.above)
+            if field.at_least is not None:
+                bad |= ~(values >= field.at_least)
+            if bad.any():
+                raise fault_of(simulation, field.name, values, bad, of_numbers(simulation))
+
     def _check_numbers(self, simulation) -> None:
         totals, dt = simulation.totals, simulation.limit.dt
         sums = (totals.energy, totals.max_density, totals.rates, dt)
@@ -103,12 +122,12 @@ class Watchdog:
         for name, values, bad in tests:
             if bad.any():
                 raise fault_of(simulation, name, values, bad, of_numbers(simulation))
-        if not finite:
+        if not all(map(math.isfinite, sums[:-1])):
             raise endless_sum(simulation)
+        why = "too small to advance time" if finite else "which is not finite"
         raise fault(
             simulation,
-            f"the time step fell to {dt:.3g}, too small to advance time; it is "
-            f"{what_sets(simulation)}",
+            f"the time step fell to {dt:.3g}, {why}; it is {what_sets(simulation)}",
             longer_steps(simulation),
             simulation.limit.particle,
         )

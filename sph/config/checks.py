@@ -3,6 +3,7 @@
 import math
 from typing import Any
 
+from sph import declarations
 from sph.config.errors import Issue
 from sph.config.toml_text import value_text
 from sph.problems.base import Problem, Section
@@ -40,11 +41,14 @@ def part_issues(found: dict[str, Section]) -> list[Issue]:
     if not {"problem", "physics"} <= found.keys():
         return []
     physics, problem = found["physics"], found["problem"]
-    return [
-        Issue(("physics", key), f"= {physics.shown(key)}: {text}")
-        for kind in physics.kinds
-        for key, text in kind.issues(physics, problem)
-    ]
+    issues = []
+    for kind in physics.kinds:
+        wrong = kind.issues(physics, problem)
+        declarations.check_issues(kind, wrong, type(physics).model_fields)
+        issues += [
+            Issue(("physics", key), f"= {physics.shown(key)}: {text}") for key, text in wrong
+        ]
+    return issues
 
 
 def pairing_issues(found: dict[str, Section]) -> list[Issue]:

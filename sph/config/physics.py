@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 from pydantic import Field, create_model, model_validator
 
-from sph import parts, registry
+from sph import declarations, parts, registry
 from sph.config.choices import Choice, ModelChoice, labelled_table, plain
-from sph.config.restarts import FREE, RECORDED, REFUSED
+from sph.config.restarts import CLASSES, FREE, RECORDED, REFUSED
 from sph.config.toml_text import value_text
 from sph.part import Key, Part
 from sph.problems.base import Section
@@ -125,6 +125,7 @@ class Physics(Section):
 def table(formulation: str) -> type[Physics]:
     """Return the class of [physics] for that formulation: its keys and those of its parts."""
     kinds = (registry.part_class(FORMULATIONS, formulation), *parts.classes(formulation))
+    declarations.check_keys(kinds, dir(Physics) + list(Physics.model_fields), CLASSES)
     fields = {key.name: _field(key) for kind in kinds for key in kind.keys}
     found = create_model("Physics", __base__=Physics, __doc__=Physics.__doc__, **fields)
     found.kinds = kinds

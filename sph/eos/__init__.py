@@ -31,6 +31,10 @@ class Defaults(Model):
     # lowest_energy(density): u of cold gas, at and below which sound has no speed; None: u = 0
     lowest_energy: Callable[[Any], Any] | None = None
 
+    @classmethod
+    def required(cls):
+        return "pressure", "sound_speed", "internal_energy"
+
 
 @verb
 def pressure(self: EquationOfState, density: Any, internal_energy: Any) -> Any:

@@ -3,6 +3,8 @@
 The `__init__.py` of a folder defines one subclass of `Formulation`.
 """
 
+from typing import ClassVar
+
 import numpy as np
 
 from sph.part import Part
@@ -16,6 +18,7 @@ class Formulation(Part):
     """The part with the basic equations (`physics.formulation`), of which a scene has one."""
 
     fields = COMMON
+    roles: ClassVar[tuple[str, ...]] = ()  # of the terms that its pair loops call
     # The models of the passes, and those of the first passes, which have no initial guess.
     models: tuple
     starting_models: tuple
@@ -28,3 +31,6 @@ class Formulation(Part):
     def pressure(self, state: State) -> np.ndarray:
         """Return the pressure (N,) of the state at the end of a step."""
         raise NotImplementedError
+
+
+BASE = Formulation

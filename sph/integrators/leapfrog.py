@@ -9,7 +9,7 @@ history records as energy_injected. With the time step limit u/|du/dt| this does
 import numpy as np
 from numba import njit
 
-from sph.compiled import COMPILED
+from sph.compiled import COMPILED, INLINED
 from sph.part import Evolved, Rule
 from sph.state import State
 
@@ -104,7 +104,7 @@ def _positive_correct(dt, energy, rate, mass) -> float:
     return given
 
 
-@njit(**COMPILED, forceinline=True)
+@njit(**INLINED)
 def _kept_positive(energy, change):
     """Return u + change kept positive, and the energy that this added."""
     # the order of this comparison lets NaN pass, for the watchdog to find

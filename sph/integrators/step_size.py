@@ -128,9 +128,10 @@ def limit(bounds: Bounds, state: State, parts: tuple[Part, ...], past: Past | No
     dt, criterion = bounds.courant * dt, CRITERIA[index] if index else bounds.criterion
     for part in parts:
         times = part.step_limit(s)
-        if times is not None and times.min() < dt:
+        # the order of this comparison lets NaN pass, for the watchdog to find
+        if times is not None and not times.min() >= dt:
             dt, criterion = float(times.min()), part.name
-            particle = s.id[times == dt].min()
+            particle = s.id[~(times > dt)].min()
     rate, changed = _rate_of_supports(s, past)
     if rate * dt > SUPPORT_CHANGE:
         dt, particle, criterion = SUPPORT_CHANGE / rate, changed, "support"

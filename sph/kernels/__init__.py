@@ -44,6 +44,10 @@ class Defaults(Model):
     # (docs/measurements.md, section "Pairing").
     pairs_above: Mapping[int, float] = MappingProxyType({})
 
+    @classmethod
+    def required(cls):
+        return "normalisation", "w", "dw_over_q", "force_over_q"
+
 
 @verb
 def normalisation(self: Kernel, dim: Dim) -> float:

@@ -13,7 +13,7 @@ apart; in smooth flow this is true of the root.
 import numpy as np
 from numba import njit
 
-from sph.compiled import COMPILED, larger, smaller
+from sph.compiled import COMPILED, INLINED, larger, smaller
 from sph.domain import Images
 from sph.neighbours import tree
 from sph.neighbours.order import BLOCK
@@ -48,7 +48,7 @@ def first_contact(
     return whole * part, particle
 
 
-@njit(**COMPILED, forceinline=True)
+@njit(**INLINED)
 def _served(velocity, acceleration, support, images, box_length, dt):
     """Return the fraction of dt for which images are valid; 0 if relative motions are small."""
     D, n = velocity.shape
@@ -71,7 +71,7 @@ def _served(velocity, acceleration, support, images, box_length, dt):
     return min(1.0, box_length / apart)
 
 
-@njit(**COMPILED, forceinline=True)
+@njit(**INLINED)
 def _walk(position, moves, support, identity, images, reached):
     """Return the first contact as a fraction of the step with displacements `moves` (D, N)."""
     n = support.size
@@ -147,7 +147,7 @@ def _earliest(boxes, motion, images, a, b, image, best):
     return max(0.0, np.sqrt(apart) - reach) / np.sqrt(travel)
 
 
-@njit(**COMPILED, forceinline=True)
+@njit(**INLINED)
 def _contact(position, moves, support, images, i, j, image, reached):
     """Return the fraction at which the step must end for i and an image of j; inf if no bound."""
     squared = along = travel = 0.0

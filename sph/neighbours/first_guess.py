@@ -3,7 +3,7 @@
 import numpy as np
 from numba import njit
 
-from sph.compiled import COMPILED
+from sph.compiled import COMPILED, INLINED
 from sph.neighbours import BALL, tree
 from sph.neighbours.order import BLOCK
 
@@ -17,7 +17,7 @@ TOO_MANY = 8.0
 HALVINGS = 60
 
 
-@njit(**COMPILED, forceinline=True)
+@njit(**INLINED)
 def _spacing(lower, upper, n):
     """Return the spacing s of n particles whose extent is e, from prod(e + s) = n s^D."""
     D = lower.size

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from sph.compiled import COMPILED, larger, smaller
+from sph.compiled import COMPILED, INLINED, larger, smaller
 from sph.domain import Images
 from sph.neighbours.order import BLOCK, number_of_blocks
 from sph.neighbours.tree import Tree
@@ -35,7 +35,7 @@ def _gap(lower_a, upper_a, lower_b, upper_b):
     return max(0.0, max(lower_b - upper_a, lower_a - upper_b))
 
 
-@njit(**COMPILED, forceinline=True)
+@njit(**INLINED)
 def _fill(chunk, dim, tree, position, support, stretch, images, region, start, count, candidates):
     """Fill the lists of a chunk's blocks into its region; return the room they need."""
     first, last, lower, upper, largest = tree

@@ -8,17 +8,17 @@ not unroll.
 from numba import njit, types
 from numba.extending import overload
 
-from sph.compiled import COMPILED, INLINED
+from sph.compiled import INLINED
 from sph.neighbours.lists import IMAGE_SHIFT
 
 
-@njit(**COMPILED, forceinline=True)
+@njit(**INLINED)
 def unpacked(packed):
     """Return (particle, image) of a candidate in the lists."""
     return packed & ((1 << IMAGE_SHIFT) - 1), packed >> IMAGE_SHIFT
 
 
-@njit(**COMPILED, forceinline=True)
+@njit(**INLINED)
 def most_candidates(first_block, last_block, count):
     """Return the length of scratch arrays for blocks [first_block, last_block)."""
     size = 0
@@ -27,7 +27,7 @@ def most_candidates(first_block, last_block, count):
     return size
 
 
-@njit(**COMPILED, forceinline=True)
+@njit(**INLINED)
 def place_in(scratch, k, position, j, dim, sign, offset, image):
     """Set scratch[:, k] to the position of an image of particle j; position: (D, N)."""
     for d in range(len(dim)):

@@ -68,6 +68,8 @@ class Gas(Formulation):
             at_most=100,  # more converge no further, and a step would never end
         ),
     )
+    roles = ("viscosity", "balsara", "exchange")
+    reserves = ("pressure", "energy_shift", "div_v", "curl_v")
     evolved = (Evolved("internal_energy", "energy_rate", "predicted_energy", POSITIVE),)
 
     def __init__(self, scene):

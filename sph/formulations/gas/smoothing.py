@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 from numba import njit
 
-from sph.compiled import COMPILED, verb
+from sph.compiled import INLINED, verb
 from sph.kernels import dw_over_q, normalisation, w
 
 # Each pass of eqs 7 and 15 multiplies the distance from their common root by 1 - Omega. In resolved
@@ -75,7 +75,7 @@ class Converged(NamedTuple):
         return solve(kernel, dim, r, m, nc, mass, H, ratio, reach, largest, self.tolerance)
 
 
-@njit(**COMPILED, forceinline=True)
+@njit(**INLINED)
 def solve(kernel, dim, r, m, nc, mass, H, ratio, reach, largest, tolerance):
     """Return the root of eqs 7 and 15 by Newton's iteration, safeguarded by bisection."""
     C = normalisation(kernel, dim)

@@ -6,7 +6,7 @@ pass use only their results. Arrays are (N,), i is the particle.
 
 from numba import njit
 
-from sph.compiled import COMPILED
+from sph.compiled import INLINED
 from sph.eos import pressure as pressure_of
 from sph.eos import sound_speed as sound_speed_of
 from sph.formulations.gas.schemes import summed_terms
@@ -21,7 +21,7 @@ def _over(P, Omega, rho):
     return P / (Omega * rho * rho)
 
 
-@njit(**COMPILED, forceinline=True)
+@njit(**INLINED)
 def equation_of_state(i, models, rho, Omega, energy, pressure, pressure_term, sound_speed):
     """Pressure, P/(Omega rho^2) and sound speed; returns the last. pressure may be None."""
     P = pressure_of(models.eos, rho, energy[i])
@@ -33,7 +33,7 @@ def equation_of_state(i, models, rho, Omega, energy, pressure, pressure_term, so
     return c
 
 
-@njit(**COMPILED, forceinline=True)
+@njit(**INLINED)
 def summed(i, models, energy, energy_density, slope, pressure, pressure_term, energy_shift):
     """The same of a scheme that sums its pressure: from the sum of m_j u_j W_ij and its slope."""
     pressure[i], pressure_term[i], energy_shift[i] = summed_terms(
@@ -41,7 +41,7 @@ def summed(i, models, energy, energy_density, slope, pressure, pressure_term, en
     )
 
 
-@njit(**COMPILED, forceinline=True)
+@njit(**INLINED)
 def dissipation(i, models, H, c, div, curl, alpha, balsara, alpha_rate):
     """Balsara's factor (eq 21) and the rate of alpha (eqs 27-28), where the scene has them."""
     if balsara is not None:

@@ -32,6 +32,10 @@ class Exchange(Model):
     suits_gravity = True
     switched = False
 
+    @classmethod
+    def required(cls):
+        return "exchange_speed", "strength"
+
 
 class Conductivity(Part):
     """A term of the energy equation, with a pass that finds contacts if `switched` is true."""
@@ -47,6 +51,7 @@ class Conductivity(Part):
         ),
     )
     formulations = ("gas",)
+    reserves = ("exchange_share",)
     changes_solution = False
 
     def __init__(self, exchange):

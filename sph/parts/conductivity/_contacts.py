@@ -6,7 +6,7 @@ lap u = 2 sum m_j/rho_j (u_i - u_j) (dW/dr)/r, as in Price & Monaghan (2005) aft
 import numpy as np
 from numba import njit
 
-from sph.compiled import COMPILED, larger, smaller
+from sph.compiled import COMPILED, INLINED, larger, smaller
 from sph.kernels import dw_over_q, normalisation
 from sph.neighbours.order import BLOCK
 from sph.passes import TINY
@@ -15,7 +15,7 @@ from sph.passes.gather import copy_in, most_candidates, place_in, unpacked
 COLD = 1e-300  # gives 0 instead of 0/0 in uniform cold gas
 
 
-@njit(**COMPILED, forceinline=True)
+@njit(**INLINED)
 def share(h, laplacian, energy, signal_speed):
     """Return the fraction of the conductivity that acts on a particle, 0 to 1.
 

@@ -21,6 +21,10 @@ class Field(Model):
 
     softening = 0.0  # a length; 0 for fields without softening
 
+    @classmethod
+    def required(cls):
+        return "acceleration", "potential"
+
     def misfit(self, boundaries):
         return None
 

@@ -58,6 +58,10 @@ HIGHEST = Parameter("largest alpha, approached in strong compression", at_least=
 class Switch(Coefficient):
     """Base of switches: alpha is between `min` and `max`; a pair uses the mean of both."""
 
+    @classmethod
+    def required(cls):
+        return "min", "max", "alpha_after" if cls.finds_shocks else "alpha_rate"
+
     def issues(self):
         if self.min > self.max:
             return [("min", f"= {self.min}: expected at most max = {self.max}")]
@@ -99,6 +103,7 @@ class Viscosity(Part):
         ),
     )
     formulations = ("gas",)
+    reserves = ("alpha", "alpha_rate", "predicted_alpha", "balsara")
     changes_solution = False
 
     def __init__(self, coefficient, balsara, dimension: int):

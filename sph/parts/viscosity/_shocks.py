@@ -11,7 +11,7 @@ shrink with the step.)
 import numpy as np
 from numba import njit
 
-from sph.compiled import COMPILED, larger, smaller, verb
+from sph.compiled import COMPILED, INLINED, larger, smaller, verb
 from sph.formulations.gas.weighting import mass_per_weight, weight
 from sph.kernels import dw_over_q, normalisation, w
 from sph.neighbours.order import BLOCK
@@ -33,7 +33,7 @@ def alpha_after(
     )  # fmt: skip
 
 
-@njit(**COMPILED, forceinline=True)
+@njit(**INLINED)
 def _invert(matrix, inverse):
     """Write the inverse of a symmetric positive (D, D) matrix, zero if singular (Gauss-Jordan).
 

@@ -27,6 +27,10 @@ class Scheme(Model):
 
     sums_pressure = False
 
+    @classmethod
+    def required(cls):
+        return ("pair", "summed_terms") if cls.sums_pressure else ("pair",)
+
 
 @verb
 def pair(self, term_i, term_j, slope_i, slope_j, Pi):
