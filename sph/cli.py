@@ -184,7 +184,8 @@ def list_choices():
         folders = package in ("sph.formulations", "sph.parts")
         for name in registry.names(package, folders):
             module = registry.load(package, name, folders)
-            click.echo(f"  {name:24s} {docstring(module).strip().splitlines()[0]}")
+            first, *_ = docstring(module).splitlines() or ["(no docstring)"]
+            click.echo(f"  {name:24s} {first}")
     click.echo("stress cases:")
     for case in stress_cases():
         click.echo(f"  {case.name:24s} {case.title}")

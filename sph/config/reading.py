@@ -20,7 +20,7 @@ from sph.config.errors import (
     wrong_value,
 )
 from sph.config.toml_text import Path, key_lines, value_text
-from sph.errors import ConfigError, FileError
+from sph.errors import ConfigError, DeclarationError, FileError
 from sph.problems.base import Problem, Section
 
 # Keys that exclude each other: if the user gives one, the default of the other is not used.
@@ -235,7 +235,10 @@ def _problem_class(raw: dict[str, Any], issues: list[Issue]) -> type[Problem] | 
     valid, path = registry.names("sph.problems"), ("problem", "name")
     name = raw.get("name")
     if name in valid:
-        return registry.load("sph.problems", name).Problem
+        module = registry.load("sph.problems", name)
+        if not hasattr(module, "Problem"):
+            raise DeclarationError(f"{module.__file__}: expected a class Problem")
+        return module.Problem
     if name is None:
         issues.append(Issue(path, f"is missing: expected one of {', '.join(valid)}"))
     elif isinstance(name, str):
