@@ -107,7 +107,9 @@ def run(config, overrides, directory, threads, dry_run, force, strict):
         return
     from sph import progress, runner
     from sph.output.run_directory import RunDirectory
+    from sph.scene import Scene
 
+    _ = Scene(resolved).all_parts  # errors of declarations, before a directory is made
     target = RunDirectory.create(where, force)
     _print_result(runner.run(resolved, target, progress.suited()), target, strict)
 

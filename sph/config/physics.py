@@ -10,6 +10,7 @@ from sph import declarations, parts, registry
 from sph.config.choices import Choice, ModelChoice, labelled_table, plain
 from sph.config.restarts import CLASSES, FREE, RECORDED, REFUSED
 from sph.config.toml_text import value_text
+from sph.errors import DeclarationError
 from sph.part import Key, Part
 from sph.problems.base import Section
 
@@ -153,6 +154,12 @@ def _field(key: Key) -> tuple[Any, Any]:
     if key.kind is not None:
         found = plain(key.kind, key.above, key.at_least, key.at_most)
     if key.models:
+        known = registry.names(key.models)
+        if not known or (key.default_model and key.default_model not in known):
+            raise DeclarationError(
+                f"key {key.name!r}: expected models, a folder with files, and default_model, one "
+                f"of these; {key.models} has {', '.join(known) or 'none'}"
+            )
         choice = (
             labelled_table(key.models, key.label, key.default_model, key.label_help)
             if key.default_model

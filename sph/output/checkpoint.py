@@ -21,7 +21,7 @@ import h5py
 import numpy as np
 
 from sph import config as configuration
-from sph import fingerprint
+from sph import extensions, fingerprint
 from sph.errors import ConfigError, FileError
 from sph.output import hdf5, layout, stored, validity
 from sph.output.files import Damaged, PatientFile, is_sealed, opened, replacing, seal
@@ -112,7 +112,7 @@ def read(path: Path) -> Checkpoint:
             f"{path}: checkpoint not found.\nTry: `ls {path.parent}` for existing ones."
         ) from None
     _check_hashes(path, state, texts)
-    config = _config(path, texts["configuration"])
+    config = _config(path, texts)
     checkpoint = _checkpoint(path, state, config, texts)
     _check_state(path, checkpoint)
     return checkpoint
@@ -244,13 +244,16 @@ def _lineage(path: Path, text: str) -> tuple[str, ...]:
     return tuple(lineage)
 
 
-def _config(path: Path, text: str) -> configuration.Config:
+def _config(path: Path, texts: dict[str, str]) -> configuration.Config:
     try:
-        return configuration.from_text(text, f"the configuration in {path}")
+        return configuration.from_text(texts["configuration"], f"the configuration in {path}")
     except (ConfigError, RecursionError) as error:
+        added = f", with its {extensions.PACKAGE} on the Python path"
+        of_users = extensions.PACKAGE in texts.get("computed_by", "")
         raise FileError(
             f"{path} has a configuration that is invalid in this version of sph ({__version__}): "
-            f"{error}\nTry: the version of sph that wrote it, or start the run again."
+            f"{error}\nTry: the version of sph that wrote it{added * of_users}, or start the run "
+            "again."
         ) from error
 
 

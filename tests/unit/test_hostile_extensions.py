@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from sph import config, declarations, parts, preview, registry
+from sph import config, declarations, parts, preview, registry, runner
 from sph.cli import main
 from sph.clock import Clock
 from sph.config import choices, physics
 from sph.errors import ConfigError, DeclarationError, NumericalError
-from sph.output import history, stored
+from sph.output import checkpoint, history, stored
 from sph.scene import Scene
 from sph.simulation import Simulation
 from sph.state import State
@@ -166,6 +166,12 @@ BROKEN_PARTS = {
     "a key of [physics]": (PART.replace('"mine"', '"eta"'), "'eta' is declared by the table"),
     "an attribute of [physics]": (PART.replace('"mine"', '"shown"'), "'shown' is declared by"),
     "a key of another part": (PART.replace('"mine"', '"heating"'), r"declared by sph.*too"),
+    "a folder of models": (
+        PART.replace("kind=float", 'models="sph.parts.nowhere"'), "sph.parts.nowhere has none"
+    ),
+    "a default model": (
+        PART.replace("kind=float", 'models="sph.eos", default_model="x"'), "has ideal_gas, stiff"
+    ),
     "a formulation": (with_body('formulations = ("gaz",)'), "'gaz' is none, expected one of gas"),
     "another object": (PART.replace("cls()", "cls"), "expected a Mine or None"),
     "rank 5": (with_body('fields = (Field("a", rank=5),)'), r"rank = 5, expected 0 \(scalar\)"),
@@ -327,6 +333,12 @@ def test_the_command_line_exits_with_2_and_lists_files_without_a_docstring(exten
     listed = CliRunner().invoke(main, ["list"])
     assert listed.exit_code == 0
     assert "plain                    (no docstring)" in listed.output
+    extension(PART_FILE, with_body("columns = ('t',)"))
+    scene = tmp_path / "scene.toml"
+    scene.write_text(SCENE.format("mine = 1.0"))
+    failed = CliRunner().invoke(main, ["run", str(scene), "-o", str(tmp_path / "run")])
+    assert failed.exit_code == 2
+    assert not (tmp_path / "run").exists()
     extension(PART_FILE, "def (:")
     scene = tmp_path / "scene.toml"
     scene.write_text(SCENE.format(""))
@@ -334,6 +346,24 @@ def test_the_command_line_exits_with_2_and_lists_files_without_a_docstring(exten
         failed = CliRunner().invoke(main, command)
         assert failed.exit_code == 2, command
         assert "__init__.py, line 1: cannot be imported" in failed.output + failed.stderr
+
+
+def test_a_checkpoint_whose_extension_is_missing_names_the_key_and_the_folder(
+    extension, tmp_path, monkeypatch
+):
+    simulation = started(extension, 'fields = (Field("a"),)')
+    monkeypatch.setattr(
+        checkpoint.fingerprint, "as_json", lambda: '{"sources of sph_extensions": ""}'
+    )
+    checkpoint.write(tmp_path / "checkpoint_000000.h5", runner.state_of(simulation))
+    (tmp_path / "sph_extensions").rename(tmp_path / "elsewhere")
+    forget()
+    for command in ("restart", "plot"):
+        failed = CliRunner().invoke(main, [command, str(tmp_path / "checkpoint_000000.h5")])
+        assert failed.exit_code == 4
+        told = failed.output + failed.stderr
+        assert "physics.mine is not a key of [physics]" in told
+        assert "with its sph_extensions on the Python path" in told
 
 
 def test_a_problem_without_its_class(extension):
