@@ -228,6 +228,7 @@ class Simulation:
             sweep.neighbours = self._neighbours()
             with self.clock.phase(one.phase):
                 one.run(sweep)
+            sweep.neighbours = None  # so that `build` can free the lists
             if not one.widens:
                 return
             if not sweep.wanted.max() > 0.0:

@@ -182,6 +182,9 @@ BROKEN_PARTS = {
         with_body('fields = (Field("a", public=Public("Masses", 0, 0, 0, 0, "")),)'),
         "public name 'Masses' is that of field 'mass' too",
     ),
+    "no public name": (
+        with_body('fields = (Field("a", public="A"),)'), "expected public=Public"
+    ),
     "a public link": (
         with_body('fields = (Field("a", public=Public("Density", 0, 0, 0, 0, "")),)'),
         "'Density' is reserved",
@@ -202,6 +205,10 @@ BROKEN_PARTS = {
     "a column with a comma": (with_body('columns = ("a,b",)'), "column 'a,b': expected a name"),
     "columns as a text": (with_body('columns = "abc"'), "a comma is missing"),
     "no description": (with_body("def described(self): return 'x'"), "expected a pair of lists"),
+    "an issue of no key": (
+        with_body("@classmethod\ndef issues(cls, physics, problem): return [('b', 'text')]"),
+        r"\('b', 'text'\), expected \(key of",
+    ),
     "no list of issues": (
         with_body("@classmethod\ndef issues(cls, physics, problem): return None"),
         "issues returned None, expected a list",
@@ -370,6 +377,14 @@ def test_a_problem_without_its_class(extension):
     extension("problems/bad.py", '"""A problem."""')
     with pytest.raises(DeclarationError, match=r"bad\.py: expected a class Problem"):
         config.from_text('[problem]\nname = "bad"\n', "the test")
+
+
+def test_a_formulation_without_models(extension):
+    text = PART.replace("(Part)", "(Formulation)").replace("scene.physics.mine", "cls")
+    text = text.replace("class Mine", "from sph.formulations import Formulation\nclass Mine")
+    extension("formulations/mine/__init__.py", text)
+    with pytest.raises(DeclarationError, match=r"Mine: models, starting_models missing"):
+        described('formulation = "mine"')
 
 
 def test_a_declaration_error_is_an_error_of_configuration():
