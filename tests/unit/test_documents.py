@@ -9,9 +9,11 @@ import shlex
 from pathlib import Path
 
 import pytest
+from click.testing import CliRunner
 
 from sph import registry
 from sph.cli import main
+from sph.config.choices import ModelChoice
 from sph.config.sections import SECTIONS
 
 ROOT = Path(__file__).parents[2]
@@ -29,7 +31,9 @@ EXAMPLES = re.findall(
     (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8"),
     re.DOTALL,
 )
-CREATED = {f"{folder}/{name}.py" for folder, name, _ in EXAMPLES} | {"configs/shear_wave.toml"}
+CREATED = {f"{folder}/{name}.py" for folder, name, _ in EXAMPLES} | {
+    "configs/shear_wave.toml", "sph/parts/tether/__init__.py"
+}  # fmt: skip
 
 
 def text_of(document: Path) -> str:
@@ -109,9 +113,24 @@ def test_readme_lists_every_configuration():
     assert sorted(listed) == sorted(path.stem for path in (ROOT / "configs").glob("*.toml"))
 
 
+def test_first_lines_of_choices_are_whole_sentences():
+    """`sph list` prints these lines."""
+    choices = CliRunner().invoke(main, ["list"]).stdout.partition("stress cases:")[0]
+    lines = re.findall(r"^  (\w+) +(.*)$", choices, re.MULTILINE)
+    assert len(lines) > 30
+    assert not {name for name, said in lines if len(said) > 90 or not said.endswith(".")}
+
+
+def test_help_offers_a_table_of_parameters_only_where_a_model_has_some():
+    offered = ", or a table { name, parameters }"
+    assert ModelChoice("sph.kernels").describe().endswith(offered)
+    assert not ModelChoice("sph.formulations.gas.schemes").describe().endswith(offered)
+
+
 def test_contributing_has_an_example_for_each_folder():
     assert {folder for folder, _, _ in EXAMPLES} == {
-        "sph/kernels", "sph/schemes", "sph/eos", "sph/viscosity/switches", "sph/problems",
+        "sph/kernels", "sph/formulations/gas/schemes", "sph/eos", "sph/parts/viscosity/switches",
+        "sph/problems",
     }  # fmt: skip
 
 
