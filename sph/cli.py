@@ -156,8 +156,8 @@ def plot(sources, target):
 def new(problem, target):
     """Print a commented configuration for PROBLEM.
 
-    It gives the meaning, bounds and default of each key. `sph list` names the
-    problems.
+    The text gives the meaning, bounds and default of each key. `sph list` names
+    the problems.
     """
     from sph import config as configuration
 

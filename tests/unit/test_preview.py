@@ -38,7 +38,7 @@ def test_parts_in_and_left_out():
     inside, outside = re.search(r"Compiled in:\n(.*)Left out:\n(.*)Particles", text, re.S).groups()
     for part in ("1-D", "grad_h", "wendland_c2", "ideal_gas", "Balsara", "divergence", "u/|du/dt|"):
         assert part in inside
-    for part in ("equation for alpha: alpha is one number", "curl of velocity: no curl in 1-D"):
+    for part in ("equation for alpha: alpha is constant", "curl of velocity: no curl in 1-D"):
         assert part in outside
 
 

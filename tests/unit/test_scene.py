@@ -139,7 +139,7 @@ def test_the_models_are_those_that_were_asked_for():
 PARTS = {
     "equation for alpha": [RANGE],
     "gradients of velocity": [SHOCKS],
-    "sum of the pressure": ["physics.scheme=pressure_energy"],
+    "pressure sum over neighbours": ["physics.scheme=pressure_energy"],
     "artificial conductivity": ["physics.conductivity=approach"],
     "switch of conductivity": [CONTACTS],
     "external field": [FIELD],

@@ -199,7 +199,7 @@ def test_errors_against_different_truths_are_told_apart(naming, tubes, tmp_path)
     sph_("run", naming, "-o", tmp_path / "run", "--set", "problem.n=60")
     said = sph_("report", tubes / "n=50", tmp_path / "run", "-o", tmp_path / "report").stdout
     assert "Errors differ in what they are against" in said
-    assert "Compared: L1 error of density, weighed" in said
+    assert "Compared: L1 error of density, plotted" in said
 
 
 @pytest.mark.parametrize("dry", [[], ["--dry-run"]])

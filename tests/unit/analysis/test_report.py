@@ -185,7 +185,7 @@ def test_the_order_is_in_the_spacing_also_in_2d(tmp_path):
 
 def test_the_words(study):
     text = said(compared(study))
-    assert "L1 error of density, weighed with CPU time without compilation" in text
+    assert "L1 error of density, plotted against CPU time without compilation" in text
     assert "alpha = 1.0: order 1.00 in the particle spacing, so error ∝ cost^-0.50." in text
     assert "On the front: alpha = 1.0 at N = 100, 200, 400." in text
     assert (

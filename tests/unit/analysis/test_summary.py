@@ -47,7 +47,7 @@ def test_each_figure_is_told_with_its_name():
     assert "energy to 2e-05;" in kept
     assert "momentum to 3e-15;" in kept
     assert kept.endswith("0.9877 of the volume.")
-    assert "2 s, 3 CPU s on 2 thread" in cost
+    assert "elapsed time 2 s, 3 CPU s on 2 thread" in cost
     assert "1.5 CPU s for compilation; 1,234,567 particle updates" in cost
 
 
