@@ -1,4 +1,4 @@
-"""Formulations, one folder each: the equations for density and rates.
+"""Formulations, one folder each: the equations for density and rates of change.
 
 The `__init__.py` of a folder defines one subclass of `Formulation`.
 """
@@ -8,21 +8,22 @@ import numpy as np
 from sph.part import Part
 from sph.state import COMMON, Public, State
 
-# Derived: no array of the state.
+# Pressure is computed from the state, not stored in it.
 PRESSURE = Public("Pressures", -1, 1, -2, -5, "Pressure")
 
 
 class Formulation(Part):
-    """The part with the basic equations (`physics.formulation`), of which a scene has one."""
+    """The part with the basic equations. A scene has exactly one (`physics.formulation`)."""
 
     fields = COMMON
-    # The models of the passes, and those of the first passes, which have no initial guess.
+    # The models of the passes, and the models of a run's first passes, which start from rough
+    # guesses of the support radii.
     models: tuple
     starting_models: tuple
 
     @property
     def label(self) -> str:
-        """Name of the equations in a checkpoint."""
+        """The name of the equations that checkpoints store."""
         return self.name
 
     def pressure(self, state: State) -> np.ndarray:
