@@ -133,7 +133,7 @@ class Watchdog:
         raise fault(
             simulation,
             f"the densities do not fit the box: the sum of m/rho is {ratio:.3g} of its volume",
-            "a larger physics.eta, as kernels reach too few neighbours, or more particles",
+            "a larger physics.eta, so that kernels contain more neighbours, or more particles",
             0,
         )
 
