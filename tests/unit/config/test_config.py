@@ -39,7 +39,7 @@ def default(*overrides):
 # --- what it resolves to ----------------------------------------------------------------------
 
 
-def test_defaults_of_the_tables_and_of_the_problem():
+def test_defaults_come_from_tables_and_problem():
     found = default()
     assert found.physics.scheme == "grad_h"
     assert found.physics.C == 0.15
@@ -49,7 +49,7 @@ def test_defaults_of_the_tables_and_of_the_problem():
     assert found.output.interval == shock_tube.defaults["output.interval"]
 
 
-def test_a_problem_default_lies_under_the_users_value(monkeypatch):
+def test_problem_default_yields_to_user_value(monkeypatch):
     shock_tube = registry.load("sph.problems", "shock_tube").Problem
     monkeypatch.setattr(
         shock_tube, "defaults", {"physics.gamma": 3.0, "time.end": 7.0, "output.interval": 1.0}
@@ -59,7 +59,7 @@ def test_a_problem_default_lies_under_the_users_value(monkeypatch):
     assert (found.physics.gamma, found.time.end) == (2.0, 7.0)
 
 
-def test_a_problem_default_gives_way_to_what_stands_in_its_place(monkeypatch):
+def test_problem_default_yields_to_alternative_key(monkeypatch):
     shock_tube = registry.load("sph.problems", "shock_tube").Problem
     monkeypatch.setitem(shock_tube.defaults, "physics.gamma", 3.0)
     found = config.from_text(MINIMAL + '[physics]\neos = { name = "ideal_gas", gamma = 2 }\n')
@@ -67,7 +67,7 @@ def test_a_problem_default_gives_way_to_what_stands_in_its_place(monkeypatch):
     assert found.physics.eos_model().gamma == 2.0
 
 
-def test_a_member_that_is_set_keeps_the_rest_of_its_table(tmp_path):
+def test_override_of_member_keeps_rest_of_table(tmp_path):
     path = tmp_path / "minimal.toml"
     path.write_text(MINIMAL)
     for found in (default("problem.left.density=5"), config.load(path, ["problem.left.density=5"])):
@@ -83,7 +83,7 @@ def test_a_member_that_is_set_keeps_the_rest_of_its_table(tmp_path):
         "[problem.right]\ndensity = 1.0",
     ],
 )
-def test_a_table_in_the_file_must_be_complete(tmp_path, table):
+def test_incomplete_table_in_file_is_refused(tmp_path, table):
     path = tmp_path / "half.toml"
     path.write_text(MINIMAL + table + "\n")
     message = "problem.right.pressure is missing: expected a number greater than 0"
@@ -94,19 +94,19 @@ def test_a_table_in_the_file_must_be_complete(tmp_path, table):
     assert config.load(path, ["problem.right.pressure=0.2"]).problem.right.pressure == 0.2
 
 
-def test_a_table_that_is_set_must_be_complete():
+def test_incomplete_table_in_override_is_refused():
     with pytest.raises(ConfigError, match=r"problem\.right\.pressure is missing"):
         default("problem.right={density=1.0}")
 
 
-def test_whole_numbers_become_the_floats_that_are_meant():
+def test_integer_for_float_becomes_float():
     found = default("physics.alpha=1", "physics.gamma=2", "problem.domain=[-1, 1]")
     values = [found.physics.alpha, found.physics.gamma, *found.problem.domain]
     assert values == [1, 2, -1, 1]
     assert {type(value) for value in values} == {float}
 
 
-def test_models():
+def test_models_from_scalar_settings():
     physics = default("physics.gamma=2", "physics.alpha=2").physics
     assert type(physics.kernel_model()) is registry.model_class("sph.kernels", "wendland_c2")
     assert physics.eos_model() == registry.model_class("sph.eos", "ideal_gas")(2.0)
@@ -114,7 +114,7 @@ def test_models():
     assert type(physics.viscosity_model().alpha) is float
 
 
-def test_models_of_tables():
+def test_models_from_tables():
     physics = default(
         "physics.alpha={min = 0, max = 2}",
         "physics.kernel={name = 'cubic_spline', flattened = true}",
@@ -140,7 +140,7 @@ PAIRS = '[problem]\nname = "uniform"\n[physics]\nkernel = "cubic_spline"\n'
     [("cubic_spline", 2, 1.41, "1.4"), ("cubic_spline", 3, 1.6, "1.2"),
      ("quintic_spline", 2, 2.2, "1.8"), ("quintic_spline", 3, 1.7, "1.6")],
 )  # fmt: skip
-def test_a_kernel_is_refused_where_its_particles_pair(tmp_path, kernel, dimension, eta, limit):
+def test_kernel_at_pairing_eta_is_refused(tmp_path, kernel, dimension, eta, limit):
     path = tmp_path / "a.toml"
     path.write_text(PAIRS)
     keys = (f"physics.kernel={kernel}", f"problem.dimension={dimension}", f"physics.eta={eta}")
@@ -153,7 +153,7 @@ def test_a_kernel_is_refused_where_its_particles_pair(tmp_path, kernel, dimensio
         assert config.load(path, (*keys, f"physics.kernel={other}")).physics.eta == eta
 
 
-def test_the_error_names_the_line_and_what_to_try(tmp_path):
+def test_config_error_has_line_and_suggestion(tmp_path):
     path = tmp_path / "a.toml"
     path.write_text(PAIRS)
     with pytest.raises(ConfigError) as error:
@@ -163,7 +163,7 @@ def test_the_error_names_the_line_and_what_to_try(tmp_path):
     assert "Wendland" in str(error.value)
 
 
-def test_a_run_that_exists_stays_readable_but_not_with_changes():
+def test_existing_run_with_refused_kernel_readable_but_not_changeable():
     found = config.from_text(PAIRS)
     assert found.physics.kernel == {"name": "cubic_spline", "flattened": False}
     with pytest.raises(ConfigError, match="particles pair"):
@@ -172,7 +172,7 @@ def test_a_run_that_exists_stays_readable_but_not_with_changes():
 
 
 @pytest.mark.parametrize("value", ["1", "7", "converged"])
-def test_density_passes_are_a_count_or_a_word(value):
+def test_density_passes_accepts_count_or_converged(value):
     assert str(default(f"physics.density_passes={value}").physics.density_passes) == value
 
 
@@ -196,7 +196,7 @@ def test_resolved_text_reads_back_equal(overrides):
     assert overrides == () or found != default()
 
 
-def test_resolved_text_names_every_key_in_its_order():
+def test_resolved_text_has_every_key_in_order():
     text = default().to_toml()
     keys = [line.split(" = ")[0] for line in text.splitlines() if " = " in line]
     sections = [default().problem, default().physics, default().time, default().output]
@@ -210,7 +210,7 @@ def test_resolved_text_names_every_key_in_its_order():
     assert keys == declared
 
 
-def test_run_may_be_left_out():
+def test_run_table_may_be_omitted():
     found = default("run.threads=1")
     text = found.to_toml(include_run=False)
     assert "[run]" not in text
@@ -218,7 +218,7 @@ def test_run_may_be_left_out():
 
 
 @pytest.mark.parametrize("problem", registry.names("sph.problems"))
-def test_template_reads_back_as_the_default_and_explains_every_key(problem):
+def test_template_reads_back_as_default_and_explains_every_key(problem):
     text = config.template(problem)
     plain = config.from_text(f'[problem]\nname = "{problem}"\n')
     assert config.from_text(text) == plain
@@ -235,7 +235,7 @@ def test_template_reads_back_as_the_default_and_explains_every_key(problem):
     assert "of at least 0 or a table { min, max, switch, ell }; default" in words
 
 
-def test_template_of_no_problem_names_the_nearest():
+def test_template_unknown_problem_names_nearest():
     with pytest.raises(ConfigError, match='no problem "shock_tub"; did you mean shock_tube'):
         config.template("shock_tub")
 
@@ -243,7 +243,7 @@ def test_template_of_no_problem_names_the_nearest():
 # --- overrides --------------------------------------------------------------------------------
 
 
-def test_an_override_replaces_adds_and_merges(tmp_path):
+def test_override_replaces_adds_and_merges(tmp_path):
     path = tmp_path / "a.toml"
     path.write_text(MINIMAL + "[physics]\nalpha = { min = 0.1, max = 2.0 }\n")
     found = config.load(path, ["physics.alpha.max=3", "time.end=9", "physics.kernel=cubic_spline"])
@@ -252,34 +252,34 @@ def test_an_override_replaces_adds_and_merges(tmp_path):
     assert found.physics.kernel == {"name": "cubic_spline", "flattened": False}
 
 
-def test_the_last_override_of_a_key_counts():
+def test_override_repeated_last_one_wins():
     assert default("time.end=1", "time.end=2").time.end == 2.0
 
 
-def test_an_override_may_change_the_problem(tmp_path):
+def test_override_of_problem_name_changes_problem(tmp_path):
     path = tmp_path / "a.toml"
     path.write_text('[problem]\nname = "nonsense"\n')
     assert config.load(path, ["problem.name=shock_tube"]) == default()
 
 
-def test_an_override_leaves_the_original_alone():
+def test_override_leaves_original_unchanged():
     before = default("problem.left.density=2")
     before.override(["problem.left.density=3", "physics.alpha={min=0, max=1}"])
     assert before == default("problem.left.density=2")
 
 
-def test_an_override_takes_the_place_of_the_files_gamma_and_back():
+def test_override_of_eos_replaces_gamma_and_back():
     changed = default("physics.eos={name='ideal_gas', gamma=1.9}")
     assert changed.physics.gamma is None
     assert changed.override(["physics.gamma=1.3"]).physics.eos is None
 
 
 @pytest.mark.parametrize("override", ["physics.alpha", "=3", "physics..alpha=3", "physics.=3"])
-def test_an_override_without_the_form_of_one(override):
+def test_override_malformed_is_refused(override):
     assert errors(MINIMAL, [override]) == [f"--set {override}: expected TABLE.KEY=VALUE"]
 
 
-def test_an_override_is_named_where_it_is_wrong(tmp_path):
+def test_override_invalid_is_named_as_source(tmp_path):
     text = MINIMAL + "[physics]\nalpha = { min = 0.1, max = 2.0 }\ngamma = 0.5\n"
     found = errors(text, ["physics.alpha={min = 0, max = 'a'}"], tmp_path / "a.toml")
     assert found == [
@@ -490,7 +490,7 @@ WRONG = {
 
 
 @pytest.mark.parametrize(("text", "message"), WRONG.values(), ids=WRONG)
-def test_one_error_one_message(text, message):
+def test_each_error_gives_one_message(text, message):
     assert only_error(MINIMAL + text) == f"x.toml, {message}"
 
 
@@ -500,30 +500,30 @@ def test_unknown_scheme_names_the_nearest():
     assert message.endswith('did you mean "grad_h"?')
 
 
-def test_a_problem_that_does_not_exist():
+def test_unknown_problem_is_refused():
     message = only_error('[problem]\nname = "shock_tub"\n')
     expected = 'problem.name = "shock_tub" is not a problem; did you mean shock_tube?'
     assert message == f"x.toml, line 2: {expected}"
 
 
-def test_a_problem_name_of_the_wrong_type():
+def test_problem_name_wrong_type_is_refused():
     message = only_error("[problem]\nname = 3\n")
     assert message == "x.toml, line 2: problem.name = 3: expected a string"
 
 
-def test_no_problem_at_all_is_one_error():
+def test_missing_problem_is_one_error():
     valid = ", ".join(registry.names("sph.problems"))
     assert only_error("") == f"x.toml: problem.name is missing: expected one of {valid}"
 
 
-def test_a_key_outside_the_tables():
+def test_key_outside_tables_is_refused():
     assert only_error("eta = 1\n" + MINIMAL) == (
         "x.toml, line 1: eta is not a table: it belongs in [physics]"
     )
     assert only_error("zzz = 1\n" + MINIMAL).startswith("x.toml, line 1: zzz stands outside")
 
 
-def test_a_key_without_any_default_must_be_given(monkeypatch):
+def test_required_key_missing_is_refused(monkeypatch):
     shock_tube = registry.load("sph.problems", "shock_tube").Problem
     monkeypatch.delitem(shock_tube.defaults, "time.end")
     message = "time.end is missing: expected a number greater than 0"
@@ -531,17 +531,17 @@ def test_a_key_without_any_default_must_be_given(monkeypatch):
     assert only_error(MINIMAL + "[output]\n[time]\n") == f"x.toml, line 4: {message}"
 
 
-def test_a_check_of_the_problem_itself_is_passed_on():
+def test_problem_own_check_is_reported():
     message = only_error("# a gas\n" + MINIMAL + "discontinuity = 9.0")
     assert message.startswith("x.toml, line 2: problem: discontinuity = 9.0 ")
 
 
-def test_no_override_of_a_run_names_the_run():
+def test_override_of_run_refused_names_run():
     message = only_error(MINIMAL, ["physics.alpha=x"])
     assert message.startswith('--set physics.alpha=x: physics.alpha = "x": expected a number')
 
 
-def test_all_errors_at_once_in_the_order_of_the_lines(tmp_path):
+def test_all_errors_reported_at_once_in_line_order(tmp_path):
     text = """\
 n = 3
 [time]
@@ -565,12 +565,12 @@ interval = 1
     assert places == [*lines, "--set run.threads=-1"]
 
 
-def test_the_other_tables_are_checked_where_the_problem_is_unknown():
+def test_unknown_problem_other_tables_still_checked():
     found = errors('[problem]\nname = "x"\n[physics]\neta = 0\n')
     assert [line.split(": ")[0] for line in found] == ["x.toml, line 2", "x.toml, line 4"]
 
 
-def test_no_message_speaks_the_libraries_language():
+def test_messages_hide_library_wording():
     text = MINIMAL + "\n".join(
         ["n = {}", "domain = 3", "left = 1", "[physics]", "alpha = []", "kernel = 1.5", "eos = 2"]
     )
@@ -588,20 +588,20 @@ def test_no_message_speaks_the_libraries_language():
         ("a = 1\na = 2\n", "line 2, column 6"),
     ],
 )
-def test_what_is_not_toml(text, place):
+def test_invalid_toml_is_refused_with_line(text, place):
     assert only_error(text).startswith(f"x.toml, {place}: not valid TOML: ")
 
 
 # --- files ------------------------------------------------------------------------------------
 
 
-def test_a_file_loads_with_its_byte_order_mark_and_line_ends(tmp_path):
+def test_file_with_byte_order_mark_and_crlf_loads(tmp_path):
     path = tmp_path / "a.toml"
     path.write_bytes(b"\xef\xbb\xbf" + MINIMAL.replace("\n", "\r\n").encode())
     assert config.load(path) == default()
 
 
-def test_files_that_cannot_be_read(tmp_path):
+def test_unreadable_file_is_refused(tmp_path):
     binary = tmp_path / "binary.toml"
     binary.write_bytes(b"\x89HDF\xff\xfe")
     for path, reason in [
@@ -615,7 +615,7 @@ def test_files_that_cannot_be_read(tmp_path):
         assert caught.value.exit_code == 4
 
 
-def test_more_checkpoints_than_anyone_can_want():
+def test_too_many_checkpoints_is_refused():
     text = '[problem]\nname = "shock_tube"\n[time]\nend = 0.2\n[output]\ninterval = {}\n'
     with pytest.raises(ConfigError, match=r"line 6: output.interval = .*: expected at least 2e-06"):
         config.from_text(text.format("1.9e-6"))

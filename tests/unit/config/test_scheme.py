@@ -22,7 +22,7 @@ def physics(scheme, gas):
     ).physics
 
 
-def test_pressure_energy_takes_an_ideal_gas_alone(tmp_path, monkeypatch):
+def test_pressure_energy_with_other_gas_is_refused(tmp_path, monkeypatch):
     (tmp_path / "liquid.py").write_text(LIQUID)
     monkeypatch.setattr(eos, "__path__", [*eos.__path__, str(tmp_path)])
     liquid, gas = (
@@ -42,7 +42,7 @@ def test_pressure_energy_takes_an_ideal_gas_alone(tmp_path, monkeypatch):
 @pytest.mark.parametrize(
     "problem", ["sound_wave", "gresho", "yee", "noh", "point_explosion", "expanding_ball"]
 )
-def test_problems_solved_for_an_ideal_gas_refuse_another(problem):
+def test_problem_for_ideal_gas_with_other_gas_is_refused(problem):
     def read(p_inf):
         gas = f'{{ name = "stiffened_gas", gamma = 1.4, p_inf = {p_inf} }}'
         return config.from_text(f'[problem]\nname = "{problem}"\n[physics]\neos = {gas}\n', "a")
@@ -53,7 +53,7 @@ def test_problems_solved_for_an_ideal_gas_refuse_another(problem):
 
 
 @pytest.mark.parametrize("gas", ["gamma = 7.0", 'eos = { name = "ideal_gas", gamma = 7.5 }'])
-def test_a_blast_that_would_be_hollow_is_refused_before_the_run(gas):
+def test_point_explosion_gamma_at_least_7_in_3d_is_refused(gas):
     """Its solution ends at gamma = 7 in 3-D, and a run would end in that error."""
 
     def read(dimension, gas):
@@ -79,7 +79,7 @@ MASS = 'external = { name = "point_mass", mass = 1.0 }'
         ('"open"', False),
     ],
 )
-def test_a_point_mass_has_no_place_in_a_periodic_box(boundary, is_wrong):
+def test_point_mass_in_periodic_box_is_refused(boundary, is_wrong):
     text = f'[problem]\nname = "uniform"\nboundary = {boundary}\n[physics]\n{MASS}\n'
     if not is_wrong:
         assert config.from_text(text).physics.external_model().mass == 1.0
@@ -97,7 +97,7 @@ def test_a_point_mass_has_no_place_in_a_periodic_box(boundary, is_wrong):
         ('conductivity = "approach"', False),
     ],
 )
-def test_conductivity_that_acts_in_equilibrium_goes_with_no_external_field(conductivity, is_wrong):
+def test_conductivity_active_in_equilibrium_with_external_field_is_refused(conductivity, is_wrong):
     text = f'[problem]\nname = "uniform"\nboundary = "open"\n[physics]\n{conductivity}\n'
     assert config.from_text(text).physics.conductivity is not None
     if not is_wrong:
