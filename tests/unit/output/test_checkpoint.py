@@ -60,7 +60,7 @@ def damage(path, offset):
 
 @pytest.mark.parametrize("dimension", [1, 2, 3])
 @pytest.mark.parametrize("alpha", [None, 0.1])
-def test_round_trip_is_bit_for_bit(tmp_path, make_state, dimension, alpha):
+def test_write_and_read_is_bit_for_bit(tmp_path, make_state, dimension, alpha):
     state = make_state(dimension, alpha=alpha)
     state.particles.velocity[0, :3] = -0.0, 1e300, 5e-324
     path = tmp_path / "a.h5"
@@ -85,14 +85,14 @@ def test_round_trip_is_bit_for_bit(tmp_path, make_state, dimension, alpha):
     assert back.lineage == state.lineage
 
 
-def test_pressure_is_that_of_the_state(make_state):
+def test_public_pressure_matches_state(make_state):
     state = make_state()
     rho, u = state.particles.density, state.particles.internal_energy
     # one rounding a factor, three factors
     np.testing.assert_allclose(state.pressure, (1.4 - 1) * rho * u, rtol=1e-15)
 
 
-def test_equal_states_make_equal_files(tmp_path, make_state):
+def test_equal_states_give_equal_files(tmp_path, make_state):
     checkpoint.write(tmp_path / "a.h5", make_state(alpha=0.1))
     checkpoint.write(tmp_path / "b.h5", make_state(alpha=0.1))
     checkpoint.write(tmp_path / "c.h5", make_state(alpha=0.1, seed=2))
@@ -101,7 +101,7 @@ def test_equal_states_make_equal_files(tmp_path, make_state):
     assert content["a"] != content["c"]
 
 
-def test_private_datasets_are_the_numerical_state(written, make_state):
+def test_private_datasets_equal_numerical_state(written, make_state):
     state = make_state()
     with h5py.File(written) as file:
         group = file["Checkpoint"]
@@ -112,7 +112,7 @@ def test_private_datasets_are_the_numerical_state(written, make_state):
         assert "[physics]" in group.attrs["configuration"]
 
 
-def test_hash_sees_values_names_types_and_shapes():
+def test_state_hash_depends_on_values_names_types_and_shapes():
     state = {"a": np.arange(4.0), "b": np.array(1.0)}
     others = [
         {"a": np.arange(4.0) + 1e-15, "b": np.array(1.0)},
@@ -126,29 +126,29 @@ def test_hash_sees_values_names_types_and_shapes():
     assert checkpoint.state_hash(dict(reversed(state.items()))) == checkpoint.state_hash(state)
 
 
-def test_missing_file(tmp_path):
+def test_read_missing_file_is_refused(tmp_path):
     refused(tmp_path / "no.h5", "there is no checkpoint")
 
 
-def test_directory(tmp_path):
+def test_read_directory_is_refused(tmp_path):
     refused(tmp_path, "cannot read", "directory")
 
 
-def test_not_hdf5(tmp_path):
+def test_read_file_not_hdf5_is_refused(tmp_path):
     path = tmp_path / "a.h5"
     for content in (b"", b"[problem]\n"):
         path.write_bytes(content)
         refused(path, "not an HDF5 file")
 
 
-def test_hdf5_of_another_program(tmp_path):
+def test_read_hdf5_of_other_program_is_refused(tmp_path):
     path = tmp_path / "a.h5"
     h5py.File(path, "w").close()
     refused(path, "not a checkpoint of sph")
 
 
 @pytest.mark.parametrize("share", [0.0005, 0.1, 0.9, 0.99])
-def test_truncated(written, share):
+def test_read_truncated_file_is_refused(written, share):
     content = written.read_bytes()
     written.write_bytes(content[: int(share * len(content))])
     refused(written, "truncated or damaged")
@@ -156,14 +156,14 @@ def test_truncated(written, share):
         checkpoint.read(written)
 
 
-def test_one_flipped_bit_in_an_array(written):
+def test_read_flipped_bit_in_array_is_refused(written):
     with h5py.File(written) as file:
         offset = file["Checkpoint/velocity"].id.get_offset()
     damage(written, offset + 100)
     refused(written, "damaged")
 
 
-def test_one_flipped_bit_in_a_number(written):
+def test_read_flipped_bit_in_number_is_refused(written):
     with h5py.File(written) as file:
         offset = file["Checkpoint/time"].id.get_offset()
     damage(written, offset)
@@ -172,13 +172,13 @@ def test_one_flipped_bit_in_a_number(written):
     refused(written, "the state does not match its SHA-256")
 
 
-def test_one_flipped_bit_in_the_configuration(written):
+def test_read_flipped_bit_in_configuration_is_refused(written):
     damage(written, written.read_bytes().index(b"eta = 1.5"))
     unseal(written)
     refused(written, "the configuration does not match its SHA-256")
 
 
-def test_a_flipped_bit_anywhere_is_found_before_hdf5_looks(written, monkeypatch):
+def test_read_flipped_bit_anywhere_found_by_checksum(written, monkeypatch):
     whole = written.read_bytes()
     monkeypatch.setattr(stored, "load", None)  # not callable
     monkeypatch.setattr(stored, "check_apart", None)
@@ -189,12 +189,12 @@ def test_a_flipped_bit_anywhere_is_found_before_hdf5_looks(written, monkeypatch)
         refused(written, "its content does not match the SHA-256 at its end")
 
 
-def test_a_file_of_an_older_version_has_no_seal_and_is_read(written, make_state):
+def test_read_older_file_without_checksum_succeeds(written, make_state):
     unseal(written)
     assert checkpoint.read(written).time == make_state().time
 
 
-def test_zeroed_sectors_without_a_seal_are_harmless_or_refused(written, make_state):
+def test_read_zeroed_sector_without_checksum_harmless_or_refused(written, make_state):
     """HDF5 hangs on some: the global heap of the texts, which is found by its signature, is one."""
     unseal(written)
     whole = written.read_bytes()
@@ -215,7 +215,7 @@ def test_zeroed_sectors_without_a_seal_are_harmless_or_refused(written, make_sta
         ("__import__('time').sleep(60)", {"SECONDS": 0.2}, "HDF5 does not come to an end"),
     ],
 )
-def test_the_process_that_looks_at_a_file_is_limited(written, monkeypatch, program, limits, words):
+def test_inspecting_process_has_limits(written, monkeypatch, program, limits, words):
     """What HDF5 does on some damaged files, done by a stand-in for it."""
     unseal(written)
     source = Path(stored.__file__).read_text()
@@ -232,7 +232,7 @@ def test_the_process_that_looks_at_a_file_is_limited(written, monkeypatch, progr
     refused(written, words)
 
 
-def test_a_lock_of_another_program_does_not_matter(written, make_state):
+def test_read_locked_file_succeeds(written, make_state):
     with written.open("r+b") as other:
         fcntl.flock(other, fcntl.LOCK_EX)
         assert checkpoint.read(written).time == make_state().time
@@ -240,7 +240,7 @@ def test_a_lock_of_another_program_does_not_matter(written, make_state):
         assert checkpoint.read(written).time == make_state().time
 
 
-def test_what_cannot_be_read_is_not_called_damaged(written, monkeypatch):
+def test_read_unreadable_file_not_called_damaged(written, monkeypatch):
     def fail(*_):
         raise OSError(errno.EIO, "Input/output error")
 
@@ -329,7 +329,7 @@ STRANGE = {
 
 
 @pytest.mark.parametrize("what", STRANGE)
-def test_a_strange_file_is_refused_before_anything_is_made_of_it(written, what, monkeypatch):
+def test_read_unexpected_structure_is_refused_first(written, what, monkeypatch):
     """Sealed and with a matching hash, as a stranger can make it; "pipe" would block for ever."""
     monkeypatch.chdir(written.parent)
     os.mkfifo("pipe")
@@ -348,7 +348,7 @@ def test_a_strange_file_is_refused_before_anything_is_made_of_it(written, what, 
 @pytest.mark.parametrize(
     "link", [h5py.SoftLink("/Header"), h5py.ExternalLink("pipe", "/Checkpoint")]
 )
-def test_a_group_that_is_a_link_is_refused(written, link, monkeypatch):
+def test_read_linked_group_is_refused(written, link, monkeypatch):
     monkeypatch.chdir(written.parent)
     os.mkfifo("pipe")
     with h5py.File(written, "r+") as file:
@@ -358,7 +358,7 @@ def test_a_group_that_is_a_link_is_refused(written, link, monkeypatch):
     refused(written, "no group /Checkpoint")
 
 
-def test_no_particles(tmp_path, make_state):
+def test_read_file_without_particles_is_refused(tmp_path, make_state):
     path = tmp_path / "a.h5"
     state = make_state()
     state.particles = Particles(**{n: a[..., :0] for n, a in state.particles.arrays().items()})
@@ -371,7 +371,7 @@ def test_no_particles(tmp_path, make_state):
     refused(path, "0 particles")
 
 
-def test_fields_are_those_of_the_particles():
+def test_stored_fields_match_particles():
     names = {one.name for one in dataclasses.fields(Particles)}
     assert stored.AXES.keys() == names | set(checkpoint.NOT_PARTICLES)
     assert set(stored.OF_SOME_SCENES) == {
@@ -380,13 +380,13 @@ def test_fields_are_those_of_the_particles():
 
 
 @pytest.mark.parametrize(("version", "word"), [(0, "an older"), (1000, "a newer")])
-def test_other_formats(written, version, word):
+def test_read_other_format_version_is_refused(written, version, word):
     with h5py.File(written, "r+") as file:
         file["Checkpoint"].attrs["format_version"] = version
     refused(written, word, f"({version})", f"({checkpoint.FORMAT_VERSION})")
 
 
-def test_configuration_that_this_version_does_not_take(written):
+def test_read_invalid_configuration_is_refused(written):
     with h5py.File(written, "r+") as file:
         attributes = file["Checkpoint"].attrs
         text = attributes["configuration"].replace("eta = ", "etta = ")
@@ -396,7 +396,7 @@ def test_configuration_that_this_version_does_not_take(written):
         checkpoint.read(written)
 
 
-def test_unwritable_place(tmp_path, make_state):
+def test_write_unwritable_directory_is_refused(tmp_path, make_state):
     (tmp_path / "checkpoints").touch()
     with pytest.raises(FileError, match=r"cannot write .*: Not a directory"):
         checkpoint.write(tmp_path / "checkpoints" / "checkpoint_000000.h5", make_state())
@@ -426,7 +426,7 @@ def in_another_process(path, preparation):
 @pytest.mark.parametrize(
     "moment", ["layout._unit_attributes", "files.os.fsync", "files.os.replace"]
 )
-def test_killed_while_writing_leaves_the_old_checkpoint(written, make_state, moment):
+def test_write_killed_leaves_old_checkpoint(written, make_state, moment):
     whole = written.read_bytes()
     process = in_another_process(written, f"{moment} = die")
     assert process.returncode == -signal.SIGKILL, process.stderr
@@ -440,7 +440,7 @@ def test_killed_while_writing_leaves_the_old_checkpoint(written, make_state, mom
 
 @pytest.mark.slow
 @pytest.mark.parametrize("megabytes", [0, 1, 8, 21])
-def test_full_disk_leaves_the_old_checkpoint_and_says_so(written, megabytes):
+def test_write_full_disk_leaves_old_checkpoint_and_reports(written, megabytes):
     """A limit to the size of a file stands in for the disk: the state is of 21.6 MB."""
     whole = written.read_bytes()
     limit = f"resource.setrlimit(resource.RLIMIT_FSIZE, ({megabytes} << 20, {megabytes} << 20))"

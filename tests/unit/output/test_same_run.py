@@ -75,7 +75,7 @@ def with_value(run, step, column, value):
     lines(run, change)
 
 
-def test_a_run_as_it_was_written(run):
+def test_unchanged_run_is_consistent(run):
     for number in range(4):
         check(run, number)
 
@@ -95,7 +95,7 @@ def test_a_run_as_it_was_written(run):
                        *(one[:-1] + ",1.0\n" for one in text[1:])], "it has columns strange"),
     ],
 )  # fmt: skip
-def test_a_history_with_a_gap_or_other_columns(run, change, words):
+def test_history_with_gap_or_other_columns_is_refused(run, change, words):
     lines(run, change)
     if words is None:  # what comes after the checkpoint is done anew
         check(run)
@@ -114,27 +114,27 @@ def test_a_history_with_a_gap_or_other_columns(run, change, words):
         (4, "kinetic_energy", "1.0"),
     ],
 )
-def test_a_history_of_other_values(run, step, column, value):
+def test_history_of_other_values_is_refused(run, step, column, value):
     if column == "t":
         value = "1.00001"
     with_value(run, step, column, value)
     refused(run, f"not of this run: {column} = {float(value)} at step {step}")
 
 
-def test_a_history_that_is_missing(run):
+def test_missing_history_is_refused(run):
     run.history.unlink()
     refused(run, "there is no history")
     check(run, 0)  # as a copied checkpoint that was not gone on from yet
 
 
-def test_a_configuration_of_another_problem(run, make_state):
+def test_configuration_of_other_problem_is_refused(run, make_state):
     run.write_config(make_state(dimension=2).config.to_toml())
     refused(run, r"config\.toml is not of this run: problem\.dimension, problem\.domain")
 
 
 @pytest.mark.parametrize("number", [1, 3])  # the one before the checkpoint and the one after
 @pytest.mark.parametrize("what", ["dimension", "alpha", "step", "time", "lineage", "particles"])
-def test_a_checkpoint_of_another_run(run, state, make_state, number, what):
+def test_checkpoint_of_other_run_is_refused(run, state, make_state, number, what):
     step = 2 * number
     others = {
         "dimension": at_step(make_state(dimension=2), step),
@@ -158,7 +158,7 @@ def test_a_checkpoint_of_another_run(run, state, make_state, number, what):
     refused(run, f"is not of this run: .*{words[what]}")
 
 
-def test_a_session_may_have_other_settings_if_its_lineage_says_so(run, state):
+def test_other_settings_accepted_only_with_lineage(run, state):
     later = at_step(
         state, 6, lineage=("restarted",), config=state.config.override(["physics.alpha=3.0"])
     )
@@ -166,7 +166,7 @@ def test_a_session_may_have_other_settings_if_its_lineage_says_so(run, state):
     check(run)
 
 
-def test_a_newer_format_is_neither_passed_over_nor_replaced(run):
+def test_newer_format_is_refused_not_skipped(run):
     with h5py.File(run.checkpoint_path(3), "r+") as file:
         file["Checkpoint"].attrs["format_version"] = 1000
     with pytest.raises(FileError, match="a newer format"):
@@ -176,14 +176,14 @@ def test_a_newer_format_is_neither_passed_over_nor_replaced(run):
     refused(run, "a newer format", into=run.path / "." / "")
 
 
-def test_what_is_damaged_is_no_obstacle(run):
+def test_damaged_files_are_skipped(run):
     for number in (1, 3):
         run.checkpoint_path(number).write_bytes(b"damaged")
     check(run)
     assert run.latest() == run.checkpoint_path(2)
 
 
-def test_a_checkpoint_that_cannot_be_read_is_not_passed_over(run, monkeypatch):
+def test_unreadable_checkpoint_is_refused_not_skipped(run, monkeypatch):
     last = run.checkpoint_path(3)
     last.unlink()
     last.symlink_to(run.path)  # reading a directory fails, whoever reads
