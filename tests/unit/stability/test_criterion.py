@@ -77,9 +77,7 @@ def ended(tmp_path, monkeypatch):
         (4e-3, LIMITS, 6e-3),  # half more than the reference's
     ],
 )
-def test_energy_may_drift_as_the_problem_says_or_half_more_than_the_reference(
-    ended, own, limits, allowed
-):
+def test_energy_drift_limit_is_problem_limit_or_half_above_reference(ended, own, limits, allowed):
     judge = Judge(ended("reference", State(limits), drift=own), Criterion())
     assert judge.drift == pytest.approx(allowed, rel=1e-12)
     for share, verdict in ((0.99, "stable"), (1.01, "beyond")):
@@ -87,7 +85,7 @@ def test_energy_may_drift_as_the_problem_says_or_half_more_than_the_reference(
         assert (trial.verdict, trial.drift) == (verdict, share * allowed)
 
 
-def test_a_trial_tells_what_the_run_took(ended):
+def test_trial_reports_cost_of_run(ended):
     judge = Judge(ended("reference"), Criterion())
     trial = judge.trial(0.1, ended("run"))
     assert (trial.name, trial.value, trial.time, trial.steps, trial.cpu) == (
@@ -107,7 +105,7 @@ def test_a_trial_tells_what_the_run_took(ended):
 EXACT = dict(zip(FIELDS, (0.1, 0.2, 0.3, 1e-30), strict=True))
 
 
-def test_errors_may_be_half_more_than_those_of_the_reference(ended):
+def test_error_limit_is_half_above_reference(ended):
     judge = Judge(ended("reference", errors=EXACT), Criterion())
     # round-off does not count: 1e-9 of the mean by volume, (1 + 2 x 3)/4
     largest = (0.15, 0.3, 0.45, 1.75e-9)
@@ -123,7 +121,7 @@ def test_errors_may_be_half_more_than_those_of_the_reference(ended):
     assert "internal energy is 2 of its limit" in trial.reason
 
 
-def test_without_an_exact_solution_states_are_compared_by_volume_and_particle(ended):
+def test_states_without_exact_solution_compared_by_volume_and_particle(ended):
     judge = Judge(ended("reference"), Criterion())
     # a twentieth of the mean size by volume: of velocity, of |v| + c
     assert judge.errors == pytest.approx(
@@ -138,7 +136,7 @@ def test_without_an_exact_solution_states_are_compared_by_volume_and_particle(en
     assert trial.error == pytest.approx(0.375 / (0.05 * 9 / 4), rel=1e-12)
 
 
-def test_figures_keep_the_problems_limits_or_half_more_than_the_reference(ended):
+def test_figure_limit_is_problem_limit_or_half_above_reference(ended):
     def judge(name, peak):
         run = ended(name, State(LIMITS), report={"peak": peak})
         return Judge(run, Criterion(), holds_report=False)
@@ -156,7 +154,7 @@ def test_figures_keep_the_problems_limits_or_half_more_than_the_reference(ended)
 
 
 @pytest.mark.parametrize(("own", "least"), [(0.75, 0.6), (0.3, 0.2)])
-def test_a_figure_that_must_not_fall_has_a_lower_limit(ended, own, least):
+def test_figure_with_lower_bound_has_lower_limit(ended, own, least):
     """The growth of the smooth shear layer: 0.6 at least, or two thirds of the reference's."""
     limits = {"growth": Limit(0.6, "-", at_least=True)}
     run = ended("reference", State(limits), report={"growth": own})
@@ -169,7 +167,7 @@ def test_a_figure_that_must_not_fall_has_a_lower_limit(ended, own, least):
 
 
 @pytest.mark.parametrize("own", [2.0, -2.0])
-def test_figures_without_an_exact_solution_are_within_a_twentieth_of_the_references(ended, own):
+def test_figure_without_exact_solution_within_a_twentieth_of_reference(ended, own):
     judge = Judge(ended("reference", report={"mode": own, "zero": 0.0}), Criterion())
     for mode, zero, verdict in (
         (1.04 * own, 0.0, "stable"), (0.96 * own, 5e-10, "stable"), (1.06 * own, 0.0, "beyond"),
@@ -180,7 +178,7 @@ def test_figures_without_an_exact_solution_are_within_a_twentieth_of_the_referen
     assert Judge(judge.directory, Criterion(), holds_report=False).report == {}
 
 
-def test_factors_must_be_above_one_and_parts_above_nothing():
+def test_criterion_factors_above_one_and_fractions_above_zero():
     assert Criterion.of(["error_growth=1.01", "negligible=1e-3"]).error_growth == 1.01
     for wrong in (
         "error_growth=1",
