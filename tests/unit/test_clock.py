@@ -23,7 +23,7 @@ def clock():
         yield made
 
 
-def test_a_phase_adds_up_and_waiting_costs_nothing(clock):
+def test_phase_adds_up_cpu_time_without_waiting(clock):
     for _ in range(2):
         with clock.phase("work"):
             burn(0.02)
@@ -37,7 +37,7 @@ def test_a_phase_adds_up_and_waiting_costs_nothing(clock):
     assert clock.wall >= 0.14
 
 
-def test_compilation_is_no_part_of_a_phase(clock):
+def test_phase_excludes_compilation(clock):
     @njit
     def outer(x):
         return inner(x) + 1.0
@@ -54,7 +54,7 @@ def test_compilation_is_no_part_of_a_phase(clock):
     assert clock.cpu >= clock.compiling + clock.seconds["work"]
 
 
-def test_the_first_compilation_is_told_as_it_begins(clock):
+def test_first_compilation_calls_callback_at_its_start(clock):
     told = []
     clock.on_compilation = lambda: told.append(clock.compiling)
 
@@ -71,7 +71,7 @@ def test_the_first_compilation_is_told_as_it_begins(clock):
     assert told == [0.0]
 
 
-def test_a_phase_that_fails_is_counted(clock):
+def test_phase_that_raises_is_counted(clock):
     def fail():
         with clock.phase("work"):
             burn(0.01)
@@ -82,7 +82,7 @@ def test_a_phase_that_fails_is_counted(clock):
     assert clock.seconds["work"] >= 0.01
 
 
-def test_a_closed_clock_hears_nothing(clock):
+def test_closed_clock_ignores_compilation(clock):
     Clock().close()
     other = Clock()
     other.close()
@@ -106,12 +106,12 @@ def hands(monkeypatch):
         yield now
 
 
-def test_seconds_are_of_cpu_but_for_the_wall_since_the_clock_began(hands):
+def test_seconds_are_cpu_and_wall_counts_from_start(hands):
     hands.cpu, hands.wall = 13.0, 107.0
     assert (hands.clock.cpu, hands.clock.wall) == (3.0, 7.0)
 
 
-def test_compilations_add_up_and_an_inner_one_is_part_of_the_outer(hands):
+def test_nested_compilation_counts_once(hands):
     clock = hands.clock
     with clock.phase("work"):
         hands.cpu += 1.0

@@ -33,13 +33,13 @@ def state(n=4, dimension=2, boundary="open", external=None, **changed):
     )  # fmt: skip
 
 
-def test_a_fault_says_when_what_and_what_to_try():
+def test_fault_message_has_time_cause_and_suggestion():
     error = faults.fault(state(), "it broke", "another way", 7)
     assert str(error) == "step 4, t = 0.5: it broke.\nTry: another way."
     assert error.particle == 7
 
 
-def test_what_sets_a_step_is_its_particle_and_criterion():
+def test_step_limit_text_names_particle_and_criterion():
     words = {
         "signal_speed": "by the speed of its signals",
         "energy": "u/|du/dt|",
@@ -59,7 +59,7 @@ def test_what_sets_a_step_is_its_particle_and_criterion():
     assert "grow" in faults.what_sets(StepLimit(0.1, 0, "growth"))
 
 
-def test_bad_values_are_counted_by_particle_and_the_first_is_named():
+def test_bad_values_counted_by_particle_and_first_named():
     velocity = np.array([[0.0, 1.0, np.nan, np.inf], [0.0, 2.0, np.nan, np.inf]])
     simulation = state(velocity=velocity)
     error = faults.fault_of(simulation, "velocity", velocity, ~np.isfinite(velocity), "-")
@@ -87,9 +87,7 @@ def potential(position):
         (None, {"energy_rate": np.array([1.0, 2.0, -5.0, 3.0])}, "rate of energy", 12),
     ],
 )  # fmt: skip
-def test_a_sum_that_is_not_finite_is_told_with_the_particle_of_the_most(
-    total, changed, name, particle
-):
+def test_non_finite_sum_names_particle_with_largest_term(total, changed, name, particle):
     simulation = state(external=SimpleNamespace(potential=potential), **changed)
     if total:
         setattr(simulation.totals, total, np.inf)
@@ -102,7 +100,7 @@ def test_a_sum_that_is_not_finite_is_told_with_the_particle_of_the_most(
         assert str(faults.endless_sum(simulation)) == str(error)
 
 
-def test_particles_without_neighbours_are_those_of_the_block():
+def test_missing_neighbours_names_particles_of_block():
     simulation = state(n=BLOCK + 3)
     error = faults.starved(simulation, 1)
     assert error.particle == 13
@@ -110,7 +108,7 @@ def test_particles_without_neighbours_are_those_of_the_block():
 
 
 @pytest.mark.parametrize(("boundary", "images"), [("open", 0), ("mirror", 1)])
-def test_particles_in_one_place_are_counted_with_their_images(boundary, images):
+def test_coincident_particles_counted_with_images(boundary, images):
     """The third of four particles is at the wall of x = 0, where its image is, and another's."""
     position = np.array([[0.5, 0.0, 0.0, 0.5], [0.5, 0.25, 0.25, 0.75]])
     density = np.array([1.0, 1.0, -1.0, 1.0])

@@ -11,7 +11,7 @@ from sph.integrators.step_size import Bounds, Past
 MASS = np.array([1.0, 2.0, 3.0, 4.0])
 
 
-def test_energies_take_a_straight_step_where_that_leaves_half():
+def test_energy_update_is_linear_if_half_remains():
     energy, rate, full = np.array([1.0, 2.0]), np.array([-0.5, 3.0]), np.empty(2)
     assert leapfrog.predict_energy(1.0, energy, rate, MASS[:2], full) == 0.0
     assert full.tolist() == [0.5, 5.0]
@@ -21,7 +21,7 @@ def test_energies_take_a_straight_step_where_that_leaves_half():
 
 
 @pytest.mark.parametrize("cooling", [1.1, 10.0, 1e3, 1e300])
-def test_no_step_takes_all_energy_and_what_that_costs_is_told(cooling):
+def test_energy_update_stays_positive_and_reports_injected_energy(cooling):
     energy, full = np.array([1.0, 0.0, 3.0]), np.empty(3)
     rate = np.array([-2.0 * cooling, -1.0, 1.0])
     straight = energy + 0.5 * rate
@@ -38,7 +38,7 @@ def test_no_step_takes_all_energy_and_what_that_costs_is_told(cooling):
     assert given == pytest.approx(MASS[:3] @ (energy - start - 0.5 * rate), rel=1e-14)
 
 
-def test_the_curve_leaves_the_straight_line_with_its_value_and_slope():
+def test_energy_update_joins_exponential_smoothly():
     change = -0.5 + np.array([-1e-6, 0.0, 1e-6])
     energy = np.ones(3)
     leapfrog.correct_energy(2.0, energy, change, MASS[:3])
@@ -47,7 +47,7 @@ def test_the_curve_leaves_the_straight_line_with_its_value_and_slope():
     assert energy[1] == 0.5
 
 
-def test_a_number_that_is_none_is_not_hidden():
+def test_energy_update_propagates_nan():
     energy = np.array([np.nan, 1.0, 1.0])
     leapfrog.correct_energy(1.0, energy, np.array([1.0, np.nan, -np.inf]), MASS[:3])
     assert np.isnan(energy[:2]).all()
@@ -73,11 +73,11 @@ SIGNALS = np.array([1.0, 1.0])
 ALL = Bounds(courant=0.5, energy=True, acceleration=True, end=100.0)
 
 
-def test_the_signal_speed_bounds_the_step():
+def test_step_limited_by_signal_speed():
     assert step_size.limit(ALL, particles(), SIGNALS, None, None) == (0.1, 8, "signal_speed")
 
 
-def test_heating_bounds_the_step_where_asked():
+def test_step_limited_by_heating_if_enabled():
     rates = np.array([0.0, -10.0])
     limit = step_size.limit(ALL, particles(energy_rate=rates), SIGNALS, None, None)
     assert limit == (0.05, 5, "energy")
@@ -86,12 +86,12 @@ def test_heating_bounds_the_step_where_asked():
     assert limit.criterion == "signal_speed"
 
 
-def test_gas_without_any_energy_does_not_stop_the_run():
+def test_step_with_zero_energy_is_finite():
     cold = particles(internal_energy=np.zeros(2), energy_rate=np.array([1.0, 0.0]))
     assert step_size.limit(ALL, cold, SIGNALS, None, None) == (0.1, 8, "signal_speed")
 
 
-def test_a_pull_from_outside_bounds_the_step():
+def test_step_limited_by_external_field():
     pulled = particles(acceleration=np.array([[0.0, 2000.0]]))
     # 0.5 sqrt(0.2/2000), two roots and a product of rounding
     assert step_size.limit(ALL, pulled, SIGNALS, None, None) == (
@@ -104,7 +104,7 @@ def test_a_pull_from_outside_bounds_the_step():
     assert step_size.limit(without, pulled, SIGNALS, None, None).criterion == "signal_speed"
 
 
-def test_a_support_may_not_change_by_more_than_its_part():
+def test_step_limited_by_support_change():
     """It halved in a step of 0.01: at that pace 0.2 of it takes 0.002."""
     past = Past(dt=0.01, limit=1.0, support=np.array([0.1, 0.4]))
     limit = step_size.limit(ALL, particles(), SIGNALS, None, past)
@@ -113,7 +113,7 @@ def test_a_support_may_not_change_by_more_than_its_part():
     assert step_size.limit(ALL, particles(), SIGNALS, None, grown).dt == pytest.approx(0.002)
 
 
-def test_gas_that_parts_bounds_the_step():
+def test_step_limited_in_expansion():
     """In 2-D supports grow by div v/2: 0.2 of them takes 0.004."""
     parting = np.array([100.0, -20.0])
     limit = step_size.limit(ALL, particles(), SIGNALS, parting, None)
@@ -126,12 +126,12 @@ def test_gas_that_parts_bounds_the_step():
     assert step_size.limit(ALL, particles(), SIGNALS, slow, past).criterion == "signal_speed"
 
 
-def test_supports_that_settle_in_a_tiny_step_are_no_reason_for_another():
+def test_step_not_limited_by_support_change_in_tiny_step():
     past = Past(dt=1e-9, limit=0.1, support=np.array([0.1, 0.201]))
     assert step_size.limit(ALL, particles(), SIGNALS, None, past).criterion == "signal_speed"
 
 
-def test_a_step_grows_by_its_factor_at_most():
+def test_step_growth_is_limited():
     past = Past(dt=1e-3, limit=1e-3, support=np.array([0.1, 0.2]))
     limit = step_size.limit(ALL, particles(), SIGNALS, None, past)
     assert limit == (pytest.approx(1.5e-3), 0, "growth")
@@ -140,7 +140,7 @@ def test_a_step_grows_by_its_factor_at_most():
     assert limit == (pytest.approx(0.075), 0, "growth")
 
 
-def test_a_step_cut_to_land_on_an_output_does_not_shorten_the_next():
+def test_step_cut_for_output_does_not_shorten_next():
     past = Past(dt=1e-9, limit=0.1, support=np.array([0.1, 0.2]))
     assert step_size.limit(ALL, particles(), SIGNALS, None, past).dt == 0.1
 
@@ -155,14 +155,14 @@ def test_a_step_cut_to_land_on_an_output_does_not_shorten_the_next():
         ({}, None, Past(dt=0.01, limit=1.0, support=np.full(2, 0.2)), "support"),
     ],
 )
-def test_of_particles_alike_the_lower_id_sets_the_step(alike, divergence, past, criterion):
+def test_step_limit_tie_names_lowest_id(alike, divergence, past, criterion):
     """Memory order must not show: it changes with the lists."""
     both = particles(support=np.full(2, 0.1), **alike)
     limit = step_size.limit(ALL, both, SIGNALS, divergence, past)
     assert (limit.particle, limit.criterion) == (5, criterion)
 
 
-def test_gas_in_which_nothing_moves_takes_one_step():
+def test_gas_at_rest_without_pressure_takes_one_step():
     limit = step_size.limit(ALL, particles(internal_energy=np.zeros(2)), np.zeros(2), None, None)
     assert limit == (100.0, 0, "end")
 
@@ -187,7 +187,7 @@ def growth(damping, frequency, dt=1.0):
 
 
 @pytest.mark.parametrize("damping", [0.0, 0.05, 0.3, 0.7, 0.95])
-def test_the_leapfrog_is_stable_as_far_as_the_formula_says(damping):
+def test_leapfrog_stable_up_to_formula(damping):
     """lambda dt + (w dt)^2/4 < 1; eigenvalues of 1 in size are good to the root of rounding."""
     for inside in (0.01, 0.5, 0.99):
         assert growth(damping, 2 * np.sqrt(inside * (1 - damping))) < 1 + 1e-7
@@ -206,7 +206,7 @@ def test_the_leapfrog_is_stable_as_far_as_the_formula_says(damping):
         (0.15, 1e200, 5e-201, "viscosity"),  # whose square is beyond the largest number
     ],
 )
-def test_damping_holds_the_courant_number(C, alpha, held, criterion):
+def test_courant_number_limited_by_viscosity(C, alpha, held, criterion):
     bounds = ALL._replace(courant=C, alpha=alpha)
     assert bounds.held == (pytest.approx(held, rel=1e-6), criterion)
     if held < C:
@@ -217,7 +217,7 @@ def test_damping_holds_the_courant_number(C, alpha, held, criterion):
     assert limit == (pytest.approx(0.2 * held, rel=1e-6), 8, criterion)
 
 
-def test_strong_conductivity_holds_the_courant_number():
+def test_courant_number_limited_by_conductivity():
     strong = ALL._replace(courant=0.15, conductivity=30.0)
     limit = step_size.limit(strong, particles(), SIGNALS, None, None)
     assert limit == (pytest.approx(0.2 * 0.05), 8, "conductivity")

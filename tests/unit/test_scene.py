@@ -40,12 +40,12 @@ def scene(*overrides):
          [[], ["problem.boundary=['periodic', 'open']"]]),
     ],
 )  # fmt: skip
-def test_a_property_holds_where_something_asks_for_it(name, there, absent):
+def test_scene_property_set_only_where_needed(name, there, absent):
     assert [getattr(scene(*overrides), name) for overrides in there] == [True] * len(there)
     assert [getattr(scene(*overrides), name) for overrides in absent] == [False] * len(absent)
 
 
-def test_gas_that_does_not_fill_its_box_has_no_volume_to_be():
+def test_scene_with_vacuum_has_no_expected_volume():
     closed = configuration.from_text('[problem]\nname = "noh"\nn = 50\n')
     assert set(closed.problem.boundaries) == {"mirror"}
     assert not Scene(closed).is_filled
@@ -60,7 +60,7 @@ def test_gas_that_does_not_fill_its_box_has_no_volume_to_be():
         ([FIELD], [0.0, 0.0]),
     ],
 )
-def test_momentum_is_kept_along_axes_without_walls_where_no_field_pulls(overrides, kept):
+def test_scene_momentum_conserved_without_walls_and_field(overrides, kept):
     np.testing.assert_array_equal(scene(*overrides).keeps_momentum, kept)
 
 
@@ -68,13 +68,13 @@ def test_momentum_is_kept_along_axes_without_walls_where_no_field_pulls(override
     ("boundary", "expected"),
     [("'open'", 6.0), ("['periodic', 'open']", math.inf), ("['open', 'mirror']", math.inf)],
 )
-def test_supports_are_held_where_every_axis_is_open(boundary, expected):
+def test_scene_all_axes_open_limits_supports(boundary, expected):
     domain = "problem.domain=[[0.0, 1.0], [0.0, 2.0]]"
     found = scene(domain, f"problem.boundary={boundary}", "physics.max_support=3.0")
     assert found.max_support == found.models.max_support == expected
 
 
-def test_the_models_are_those_that_were_asked_for():
+def test_scene_models_match_configuration():
     plain = scene().models
     assert plain.smoothing == FixedPasses(2, 1e-10)
     assert isinstance(plain.weighting, ByMass)  # both are equal to ()
@@ -107,7 +107,7 @@ NOTHING = [STILL, "physics.energy_limit=false"]
 
 
 @pytest.mark.parametrize("part", PARTS)
-def test_a_part_is_in_where_it_is_asked_for_and_else_left_out_with_a_reason(part):
+def test_scene_part_included_or_left_out_with_reason(part):
     inside, outside = scene(*NOTHING, *PARTS[part]).parts()
     assert part in inside
     assert not any(one.startswith(f"{part}: ") for one in outside)
@@ -118,7 +118,7 @@ def test_a_part_is_in_where_it_is_asked_for_and_else_left_out_with_a_reason(part
     assert len(outside) == len(PARTS)
 
 
-def test_what_every_scene_has_is_named():
+def test_scene_names_parts_always_included():
     inside, outside = scene("problem.boundary=periodic", "physics.density=number").parts()
     assert inside[:6] == [
         "2-D, 9 image(s) of the box",

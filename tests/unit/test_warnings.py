@@ -112,7 +112,7 @@ def ended(tmp_path_factory):
 
 
 @pytest.mark.parametrize("kind", SCENES)
-def test_a_scene_of_each_kind_ends_with_its_warning(ended, kind):
+def test_run_of_each_kind_ends_with_its_warning(ended, kind):
     result, run = ended(kind)
     assert result.exit_code == 0
     told = json.loads((run / "summary.json").read_text())["warnings"]
@@ -126,7 +126,7 @@ def test_a_scene_of_each_kind_ends_with_its_warning(ended, kind):
     assert kind in said[1].split(", ")
 
 
-def test_strict_exits_with_3_where_there_are_warnings(ended, tmp_path):
+def test_strict_with_warnings_exits_with_3(ended, tmp_path):
     scene = tmp_path / "scene.toml"
     scene.write_text(SCENES["limit"])
     result = sph("run", scene, "-o", tmp_path / "run", "--strict")
@@ -137,7 +137,7 @@ def test_strict_exits_with_3_where_there_are_warnings(ended, tmp_path):
     assert sph("report", tmp_path / "run").exit_code == 0
 
 
-def test_a_sound_run_has_no_warnings_strict_or_not(tmp_path):
+def test_valid_run_has_no_warnings(tmp_path):
     scene = tmp_path / "scene.toml"
     scene.write_text('[problem]\nname = "shock_tube"\nn = 60\n')
     result = sph("run", scene, "-o", tmp_path / "run", "--strict")
@@ -161,7 +161,7 @@ def test_reports_and_sweeps_mark_runs_with_warnings(ended, tmp_path):
     assert "Ended with warnings (hollow in the pictures): problem.n=50 (limit)." in report
 
 
-def test_every_kind_has_its_row_in_the_document():
+def test_every_kind_is_documented():
     kinds = set(re.findall(r'Warning\(\s*"(\w+)"', Path(warnings.__file__).read_text()))
     rows = set(re.findall(r"^\| `(\w+)` \|", DOCUMENT.read_text(), re.MULTILINE))
     assert kinds == rows
@@ -219,11 +219,11 @@ def told(monkeypatch):
         ({"volume_ratio_worst": 0.5}, []),
     ],
 )
-def test_bounds_of_what_is_conserved(told, kept, expected):
+def test_conserved_quantity_beyond_bound_warns(told, kept, expected):
     assert told(kept) == expected
 
 
-def test_half_a_spacing_to_the_nearest_neighbour_tells_of_pairs(told):
+def test_nearest_neighbour_below_half_spacing_warns_of_pairs(told):
     assert told(median=0.49) == ["paired"]
     assert told(median=0.51) == []  # particles at random places begin with .54
 
@@ -243,7 +243,7 @@ def texts(monkeypatch):
     return made
 
 
-def test_texts_have_the_numbers_of_the_run(texts):
+def test_warning_text_has_numbers_of_run(texts):
     alone = Scene()
     alone.held_supports = 3
     wrong = {"energy_drift_max": 0.0213, "momentum_change": 0.5, "volume_ratio": 0.8}
@@ -263,17 +263,17 @@ def test_texts_have_the_numbers_of_the_run(texts):
 
 
 @pytest.mark.parametrize("wrong", ["momentum_change", "volume_ratio"])
-def test_what_is_not_a_number_is_not_kept(texts, wrong):
+def test_nan_quantity_warns(texts, wrong):
     kind = wrong.partition("_")[0]
     assert kind in texts(conservation=KEPT | {wrong: float("nan")})
 
 
-def test_pairs_are_told_by_the_median_and_not_by_a_pair(texts):
+def test_pairs_judged_by_median_not_single_pair(texts):
     assert "paired" not in texts(nearest={"median": 0.9, "smallest": 0.0})
     assert "paired" not in texts(nearest=None)  # of a run that failed
 
 
-def test_limits_are_told_with_their_side_and_reason(texts):
+def test_limit_warning_has_side_and_reason(texts):
     limits = {"high": Limit(2.0, "as so"), "low": Limit(2.0, "as so", at_least=True)}
     found = texts(Scene(limits=limits), report={"high": 2.5, "low": 2.5})
     assert found["limit"] == "high is 2.5, above the limit of 2 (as so)."
@@ -282,20 +282,20 @@ def test_limits_are_told_with_their_side_and_reason(texts):
     assert "limit" not in texts(Scene(limits=limits), report={"high": 2.0, "low": 2.0})
 
 
-def test_a_signal_that_is_lost_comes_first(texts):
+def test_lost_signal_warning_comes_first(texts):
     lost = Scene(swamped={"wave": Limit(0.5, "half of it")})
     found = texts(lost, report={"wave": 0.75}, conservation=KEPT | {"energy_drift_max": 1.0})
     assert list(found)[:2] == ["swamped", "energy_drift"]
     assert "wave is 0.75, above the limit of 0.5 (half of it)" in found["swamped"]
 
 
-def test_a_limit_beside_a_signal_that_is_not_lost_is_told(told):
+def test_limit_warning_without_lost_signal(told):
     both = {"limits": {"wave": Limit(0.1, "so")}, "swamped": {"wave": Limit(0.5, "so")}}
     assert told(report={"wave": 0.2}, **both) == ["limit"]
     assert told(report={"wave": 0.6}, **both) == ["swamped"]
 
 
-def test_figures_are_named_as_problems_name_them():
+def test_figure_names_match_problems():
     fields = {"density": {"L1": 0.25, "L2": 0.5}}
     summary = {
         "errors": {"fields": fields}, "report": {"peak": 3.0}, "conservation": KEPT | {
@@ -311,7 +311,7 @@ def test_figures_are_named_as_problems_name_them():
     assert warnings.figure(unjudged, "peak") is None
 
 
-def test_kinds_are_told_once_each_in_order_and_not_of_old_summaries():
+def test_kinds_listed_once_in_order_without_old_summaries():
     told = [{"kind": kind} for kind in ("volume", "limit", "limit", "energy_drift", "volume")]
     assert warnings.kinds({"warnings": told}) == ["volume", "limit", "energy_drift"]
     assert warnings.kinds({}) == []
@@ -321,11 +321,11 @@ def test_kinds_are_told_once_each_in_order_and_not_of_old_summaries():
     (False, 1.0, True), (False, 1.1, False), (False, float("nan"), False),
     (True, 1.0, True), (True, 0.9, False), (True, float("nan"), False),
 ])  # fmt: skip
-def test_a_limit_holds_on_its_bound_and_for_numbers_alone(at_least, value, holds):
+def test_limit_holds_at_bound_and_fails_for_nan(at_least, value, holds):
     assert Limit(1.0, "so", at_least).holds(value) == holds
 
 
-def test_a_figure_is_told_once(told):
+def test_figure_warns_once(told):
     drift = {"energy_drift": Limit(1e-4, "so")}
     assert told({"energy_drift_max": 5e-4}, limits=drift) == ["limit"]
     assert told({"energy_drift_max": 5e-3}, limits=drift) == ["energy_drift"]
