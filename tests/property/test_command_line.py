@@ -36,7 +36,7 @@ texts = some.one_of(
 
 
 @pytest.fixture(autouse=True)
-def nothing_runs(monkeypatch, tmp_path_factory):
+def without_runs(monkeypatch, tmp_path_factory):
     """In a directory of its own, with points and runs left out."""
     directory = tmp_path_factory.mktemp("fuzzed")
     (directory / "tube.toml").write_text(TUBE)

@@ -42,7 +42,7 @@ SCENES = {
 }
 
 
-class Given(uniform.Problem):
+class GivenParticles(uniform.Problem):
     """Whatever particles a test puts in."""
 
     def initial(self, eos):
@@ -62,7 +62,7 @@ def simulation(state: InitialState, dimension, boundary, scene, **physics):
     settings = config.physics.model_dump() | SCENES[scene] | physics
     config = dataclasses.replace(
         config,
-        problem=Given(**config.problem.model_dump()),
+        problem=GivenParticles(**config.problem.model_dump()),
         physics=configuration.Physics(**settings),
     )
     GIVEN[:] = [state]

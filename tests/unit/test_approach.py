@@ -97,7 +97,7 @@ def test_step_across_box_limited_to_reach_of_images():
 # --- in runs ----------------------------------------------------------------------------------
 
 
-class Placed(uniform.Problem):
+class GivenParticles(uniform.Problem):
     """Gas where a test puts it."""
 
     places: list
@@ -126,7 +126,7 @@ def scene_of(places, speeds, energy, boundary="open", **physics):
         "energies": np.full(n, energy).tolist(),
     }
     physics = configuration.Physics(**(config.physics.model_dump() | physics))
-    return Scene(dataclasses.replace(config, problem=Placed(**settings), physics=physics))
+    return Scene(dataclasses.replace(config, problem=GivenParticles(**settings), physics=physics))
 
 
 @pytest.fixture

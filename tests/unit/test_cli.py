@@ -438,12 +438,12 @@ def test_signal_during_run_writes_checkpoint_and_exits_with_75(number, config, t
 
 
 def test_second_interrupt_ends_at_once(config, tmp_path, monkeypatch):
-    class Impatient(progress.Lines):
+    class InterruptingProgress(progress.Lines):
         def step(self, simulation):
             signal.raise_signal(signal.SIGINT)
             signal.raise_signal(signal.SIGINT)
 
-    monkeypatch.setattr(progress, "suited", Impatient)
+    monkeypatch.setattr(progress, "suited", InterruptingProgress)
     handler = signal.signal(signal.SIGINT, signal.default_int_handler)
     try:
         result = sph_("run", config, "-o", tmp_path / "run")

@@ -97,7 +97,7 @@ def test_closed_clock_ignores_compilation(clock):
 
 
 @pytest.fixture
-def hands(monkeypatch):
+def fake_time(monkeypatch):
     """The times that a clock reads, to be set, and a clock that began at 10 s and 100 s."""
     now = SimpleNamespace(cpu=10.0, wall=100.0)
     read = SimpleNamespace(process_time=lambda: now.cpu, perf_counter=lambda: now.wall)
@@ -106,25 +106,25 @@ def hands(monkeypatch):
         yield now
 
 
-def test_seconds_are_cpu_and_wall_counts_from_start(hands):
-    hands.cpu, hands.wall = 13.0, 107.0
-    assert (hands.clock.cpu, hands.clock.wall) == (3.0, 7.0)
+def test_seconds_are_cpu_and_wall_counts_from_start(fake_time):
+    fake_time.cpu, fake_time.wall = 13.0, 107.0
+    assert (fake_time.clock.cpu, fake_time.clock.wall) == (3.0, 7.0)
 
 
-def test_nested_compilation_counts_once(hands):
-    clock = hands.clock
+def test_nested_compilation_counts_once(fake_time):
+    clock = fake_time.clock
     with clock.phase("work"):
-        hands.cpu += 1.0
+        fake_time.cpu += 1.0
         for length in (2.0, 4.0):
             clock.on_start(None)
-            hands.cpu += length
+            fake_time.cpu += length
             clock.on_start(None)
-            hands.cpu += length
+            fake_time.cpu += length
             clock.on_end(None)
             clock.on_end(None)
     with clock.phase("work"):
-        hands.cpu += 8.0
-        hands.wall += 50.0
+        fake_time.cpu += 8.0
+        fake_time.wall += 50.0
     assert clock.compiling == 12.0
     assert clock.seconds == {"work": 9.0}
     assert clock.cpu == 21.0

@@ -19,7 +19,7 @@ from sph.simulation import Simulation
 from sph.watchdog import Watchdog
 
 
-class Placed(uniform.Problem):
+class GivenParticles(uniform.Problem):
     """Gas at rest where a test puts it, of one energy."""
 
     places: list
@@ -49,7 +49,7 @@ def begin(simulate):
         }
         config = dataclasses.replace(
             config,
-            problem=Placed(**settings),
+            problem=GivenParticles(**settings),
             physics=configuration.Physics(**(config.physics.model_dump() | physics)),
         )
         return simulate(config)

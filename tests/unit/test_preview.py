@@ -90,7 +90,7 @@ def test_preview_neighbours_match_count(simulation):
 
 
 @pytest.fixture
-def few(monkeypatch):
+def small_build_limit(monkeypatch):
     """Most particles that a preview builds, so few that a small run is beyond them."""
     monkeypatch.setattr(preview, "MOST_BUILT", 1000)
 
@@ -108,7 +108,7 @@ threads = 1
 """
 
 
-def test_preview_of_many_particles_scaled_from_fewer(few, monkeypatch, capsys):
+def test_preview_of_many_particles_scaled_from_fewer(small_build_limit, monkeypatch, capsys):
     scaled = described(BOX)
     assert "trying 1000 of 16384 particles" in capsys.readouterr().err
     assert figure(scaled, "Figures are scaled from # particles") == 1024  # 32 by 32
@@ -124,7 +124,7 @@ def test_preview_of_many_particles_scaled_from_fewer(few, monkeypatch, capsys):
     assert figure(scaled, cost) == pytest.approx(figure(whole, cost), rel=0.8)
 
 
-def test_preview_of_hundred_million_particles_is_fast(few):
+def test_preview_of_hundred_million_particles_is_fast(small_build_limit):
     text = described(BOX, "problem.n=100000000")
     assert "Particles: some 1e+08," in text
     # 244 bytes or more a particle, by the arrays and lists of a small run
@@ -132,7 +132,7 @@ def test_preview_of_hundred_million_particles_is_fast(few):
 
 
 @pytest.mark.slow
-def test_preview_problem_with_larger_minimum_uses_it(few):
+def test_preview_problem_with_larger_minimum_uses_it(small_build_limit):
     contrast = BOX.replace("gresho", "contrast")
     keys = ["problem.masses=equal", "problem.profile=graded", "problem.ratio=1e5"]
     text = described(contrast, *keys, "problem.n=1000000")
@@ -140,7 +140,7 @@ def test_preview_problem_with_larger_minimum_uses_it(few):
     assert figure(text, "Figures are scaled from # particles") > 3000
 
 
-def test_preview_failure_names_particle_number(few):
+def test_preview_failure_names_particle_number(small_build_limit):
     tube = BOX.replace("gresho", "shock_tube").replace("16384", "50000")
     with pytest.raises(NumericalError, match="with 4000 particles"):
         described(tube, "physics.max_energy_drift=1e-300")

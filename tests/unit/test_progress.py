@@ -35,7 +35,7 @@ threads = 1
 """
 
 
-class Hours:
+class ManualClock:
     """A clock that the test turns."""
 
     now = 100.0
@@ -46,7 +46,7 @@ class Hours:
 
 @pytest.fixture
 def clock(monkeypatch):
-    hours = Hours()
+    hours = ManualClock()
     monkeypatch.setattr(progress, "time", hours)
     return hours
 

@@ -145,8 +145,8 @@ def test_gaps_from_largest_component_and_median_velocity():
 
 
 @pytest.fixture
-def far(monkeypatch):
-    """far(kind, ratio): a simulation whose last particle has that gap over its scale."""
+def simulation_with_gap(monkeypatch):
+    """A function of kind and ratio: a simulation whose last particle has this gap over scale."""
 
     def made(kind, ratio):
         gap = resolution.Gap(kind, 2, ratio * 8.0, 8.0)
@@ -167,8 +167,8 @@ def far(monkeypatch):
         ("velocity", "(-3, -6)", "the speed of sound (8)", "bulk velocity"),
     ],
 )
-def test_message_names_particle_gap_and_scale(far, kind, place, words, remedy):
-    simulation = far(kind, 2e-3)
+def test_message_names_particle_gap_and_scale(simulation_with_gap, kind, place, words, remedy):
+    simulation = simulation_with_gap(kind, 2e-3)
     with pytest.raises(NumericalError) as caught:
         resolution.check(simulation)
     assert caught.value.particle == 9
@@ -182,16 +182,16 @@ def test_message_names_particle_gap_and_scale(far, kind, place, words, remedy):
 
 
 @pytest.mark.parametrize("kind", ["position", "velocity"])
-def test_thresholds_apply_to_ratio(far, kind):
+def test_thresholds_apply_to_ratio(simulation_with_gap, kind):
     for ratio, is_refused in ((2.1e-4, True), (1.9e-4, False)):
-        simulation = far(kind, ratio)
+        simulation = simulation_with_gap(kind, ratio)
         if is_refused:
             with pytest.raises(NumericalError):
                 resolution.check(simulation)
         else:
             resolution.check(simulation)
-    assert resolution.doubt(far(kind, 2.1e-7)) is not None
-    assert resolution.doubt(far(kind, 1.9e-7)) is None
+    assert resolution.doubt(simulation_with_gap(kind, 2.1e-7)) is not None
+    assert resolution.doubt(simulation_with_gap(kind, 1.9e-7)) is None
 
 
 @pytest.mark.parametrize(("dimension", "gap", "is_refused"), [

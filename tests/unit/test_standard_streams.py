@@ -152,7 +152,7 @@ def test_other_encodings_escape_missing_characters(encoding, tmp_path):
     assert (tmp_path / "out").read_bytes() == b"\\udcff \\u2026\n"
 
 
-class Full(io.StringIO):
+class FullStream(io.StringIO):
     def write(self, text):
         raise OSError(28, "No space left on device")
 
@@ -160,7 +160,7 @@ class Full(io.StringIO):
 @pytest.mark.parametrize("say", [progress.Lines().note, progress.PointLines().note])
 @pytest.mark.parametrize("kind", ["full", "closed", "none"])
 def test_notes_to_python_caller_dropped_when_unwritable(kind, say, monkeypatch, capsys):
-    stream = {"full": Full(), "closed": io.StringIO(), "none": None}[kind]
+    stream = {"full": FullStream(), "closed": io.StringIO(), "none": None}[kind]
     if kind == "closed":
         stream.close()
     monkeypatch.setattr(sys, "stderr", stream)

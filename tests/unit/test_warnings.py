@@ -97,8 +97,8 @@ def sph(*arguments):
 
 
 @pytest.fixture(scope="module")
-def ended(tmp_path_factory):
-    """ended(kind): the result and the run directory of its scene, run once."""
+def finished_run(tmp_path_factory):
+    """finished_run(kind): the result and the run directory of its scene, run once."""
     kept = {}
 
     def once(kind):
@@ -112,8 +112,8 @@ def ended(tmp_path_factory):
 
 
 @pytest.mark.parametrize("kind", SCENES)
-def test_run_of_each_kind_ends_with_its_warning(ended, kind):
-    result, run = ended(kind)
+def test_run_of_each_kind_ends_with_its_warning(finished_run, kind):
+    result, run = finished_run(kind)
     assert result.exit_code == 0
     told = json.loads((run / "summary.json").read_text())["warnings"]
     assert kind in [one["kind"] for one in told]
@@ -126,7 +126,7 @@ def test_run_of_each_kind_ends_with_its_warning(ended, kind):
     assert kind in said[1].split(", ")
 
 
-def test_strict_with_warnings_exits_with_3(ended, tmp_path):
+def test_strict_with_warnings_exits_with_3(finished_run, tmp_path):
     scene = tmp_path / "scene.toml"
     scene.write_text(SCENES["limit"])
     result = sph("run", scene, "-o", tmp_path / "run", "--strict")
@@ -137,7 +137,7 @@ def test_strict_with_warnings_exits_with_3(ended, tmp_path):
     assert sph("report", tmp_path / "run").exit_code == 0
 
 
-def test_valid_run_has_no_warnings(tmp_path):
+def test_valid_run_passes_with_and_without_strict(tmp_path):
     scene = tmp_path / "scene.toml"
     scene.write_text('[problem]\nname = "shock_tube"\nn = 60\n')
     result = sph("run", scene, "-o", tmp_path / "run", "--strict")
@@ -147,7 +147,7 @@ def test_valid_run_has_no_warnings(tmp_path):
 
 
 @pytest.mark.slow
-def test_reports_and_sweeps_mark_runs_with_warnings(ended, tmp_path):
+def test_reports_and_sweeps_mark_runs_with_warnings(finished_run, tmp_path):
     scene = tmp_path / "scene.toml"
     scene.write_text(SCENES["limit"])
     swept = sph("sweep", scene, "--vary", "problem.n=50,100", "-o", tmp_path / "sweep", "--jobs", 1)
@@ -175,7 +175,7 @@ KEPT = {
 }  # fmt: skip
 
 
-class Scene:
+class FakeSimulation:
     """What a warning looks at of a simulation, and nothing amiss in it."""
 
     def __init__(self, limits=None, swamped=None):
@@ -187,8 +187,8 @@ class Scene:
 
 
 @pytest.fixture
-def told(monkeypatch):
-    """told(kept, report, ...): the kinds of warning for figures of a summary."""
+def kinds_of(monkeypatch):
+    """kinds_of(kept, report, ...): the kinds of warning for figures of a summary."""
     monkeypatch.setattr(warnings.resolution, "doubt", lambda _: None)  # there are no particles
 
     def kinds(kept=(), report=None, median=1.0, **of_problem):
@@ -196,7 +196,7 @@ def told(monkeypatch):
             "conservation": KEPT | dict(kept), "errors": None, "report": report or {},
             "nearest": {"median": median, "smallest": 0.0},
         }  # fmt: skip
-        return [one.kind for one in warnings.of_run(Scene(**of_problem), summary)]
+        return [one.kind for one in warnings.of_run(FakeSimulation(**of_problem), summary)]
 
     return kinds
 
@@ -219,35 +219,35 @@ def told(monkeypatch):
         ({"volume_ratio_worst": 0.5}, []),
     ],
 )
-def test_conserved_quantity_beyond_bound_warns(told, kept, expected):
-    assert told(kept) == expected
+def test_conserved_quantity_beyond_bound_warns(kinds_of, kept, expected):
+    assert kinds_of(kept) == expected
 
 
-def test_nearest_neighbour_below_half_spacing_warns_of_pairs(told):
-    assert told(median=0.49) == ["paired"]
-    assert told(median=0.51) == []  # particles at random places begin with .54
+def test_nearest_neighbour_below_half_spacing_warns_of_pairs(kinds_of):
+    assert kinds_of(median=0.49) == ["paired"]
+    assert kinds_of(median=0.51) == []  # particles at random places begin with .54
 
 
 @pytest.fixture
-def texts(monkeypatch):
-    """texts(simulation, **summary): the warnings of a run by their kinds, in order."""
+def texts_of(monkeypatch):
+    """texts_of(simulation, **summary): the warnings of a run by their kinds, in order."""
     monkeypatch.setattr(warnings.resolution, "doubt", lambda _: "far from 0")
     whole = {
         "conservation": KEPT, "errors": None, "report": {}, "nearest": {"median": 1.0},
     }  # fmt: skip
 
     def made(simulation=None, **changed):
-        found = warnings.of_run(simulation or Scene(), whole | changed)
+        found = warnings.of_run(simulation or FakeSimulation(), whole | changed)
         return {one.kind: one.text for one in found}
 
     return made
 
 
-def test_warning_text_has_numbers_of_run(texts):
-    alone = Scene()
+def test_warning_text_has_numbers_of_run(texts_of):
+    alone = FakeSimulation()
     alone.held_supports = 3
     wrong = {"energy_drift_max": 0.0213, "momentum_change": 0.5, "volume_ratio": 0.8}
-    found = texts(alone, conservation=KEPT | wrong, nearest={"median": 0.25, "smallest": 0.1})
+    found = texts_of(alone, conservation=KEPT | wrong, nearest={"median": 0.25, "smallest": 0.1})
     assert list(found) == [
         "energy_drift", "momentum", "volume", "held_supports", "resolution", "paired",
     ]  # fmt: skip
@@ -263,36 +263,36 @@ def test_warning_text_has_numbers_of_run(texts):
 
 
 @pytest.mark.parametrize("wrong", ["momentum_change", "volume_ratio"])
-def test_nan_quantity_warns(texts, wrong):
+def test_nan_quantity_warns(texts_of, wrong):
     kind = wrong.partition("_")[0]
-    assert kind in texts(conservation=KEPT | {wrong: float("nan")})
+    assert kind in texts_of(conservation=KEPT | {wrong: float("nan")})
 
 
-def test_pairs_judged_by_median_not_single_pair(texts):
-    assert "paired" not in texts(nearest={"median": 0.9, "smallest": 0.0})
-    assert "paired" not in texts(nearest=None)  # of a run that failed
+def test_pairs_judged_by_median_not_single_pair(texts_of):
+    assert "paired" not in texts_of(nearest={"median": 0.9, "smallest": 0.0})
+    assert "paired" not in texts_of(nearest=None)  # of a run that failed
 
 
-def test_limit_warning_has_side_and_reason(texts):
+def test_limit_warning_has_side_and_reason(texts_of):
     limits = {"high": Limit(2.0, "as so"), "low": Limit(2.0, "as so", at_least=True)}
-    found = texts(Scene(limits=limits), report={"high": 2.5, "low": 2.5})
+    found = texts_of(FakeSimulation(limits=limits), report={"high": 2.5, "low": 2.5})
     assert found["limit"] == "high is 2.5, above the limit of 2 (as so)."
-    found = texts(Scene(limits=limits), report={"high": 1.5, "low": 1.5})
+    found = texts_of(FakeSimulation(limits=limits), report={"high": 1.5, "low": 1.5})
     assert found["limit"] == "low is 1.5, below the limit of 2 (as so)."
-    assert "limit" not in texts(Scene(limits=limits), report={"high": 2.0, "low": 2.0})
+    assert "limit" not in texts_of(FakeSimulation(limits=limits), report={"high": 2.0, "low": 2.0})
 
 
-def test_lost_signal_warning_comes_first(texts):
-    lost = Scene(swamped={"wave": Limit(0.5, "half of it")})
-    found = texts(lost, report={"wave": 0.75}, conservation=KEPT | {"energy_drift_max": 1.0})
+def test_lost_signal_warning_comes_first(texts_of):
+    lost = FakeSimulation(swamped={"wave": Limit(0.5, "half of it")})
+    found = texts_of(lost, report={"wave": 0.75}, conservation=KEPT | {"energy_drift_max": 1.0})
     assert list(found)[:2] == ["swamped", "energy_drift"]
     assert "wave is 0.75, above the limit of 0.5 (half of it)" in found["swamped"]
 
 
-def test_limit_warning_without_lost_signal(told):
+def test_limit_warning_without_lost_signal(kinds_of):
     both = {"limits": {"wave": Limit(0.1, "so")}, "swamped": {"wave": Limit(0.5, "so")}}
-    assert told(report={"wave": 0.2}, **both) == ["limit"]
-    assert told(report={"wave": 0.6}, **both) == ["swamped"]
+    assert kinds_of(report={"wave": 0.2}, **both) == ["limit"]
+    assert kinds_of(report={"wave": 0.6}, **both) == ["swamped"]
 
 
 def test_figure_names_match_problems():
@@ -312,8 +312,8 @@ def test_figure_names_match_problems():
 
 
 def test_kinds_listed_once_in_order_without_old_summaries():
-    told = [{"kind": kind} for kind in ("volume", "limit", "limit", "energy_drift", "volume")]
-    assert warnings.kinds({"warnings": told}) == ["volume", "limit", "energy_drift"]
+    found = [{"kind": kind} for kind in ("volume", "limit", "limit", "energy_drift", "volume")]
+    assert warnings.kinds({"warnings": found}) == ["volume", "limit", "energy_drift"]
     assert warnings.kinds({}) == []
 
 
@@ -325,11 +325,15 @@ def test_limit_holds_at_bound_and_fails_for_nan(at_least, value, holds):
     assert Limit(1.0, "so", at_least).holds(value) == holds
 
 
-def test_figure_warns_once(told):
+def test_figure_warns_once(kinds_of):
     drift = {"energy_drift": Limit(1e-4, "so")}
-    assert told({"energy_drift_max": 5e-4}, limits=drift) == ["limit"]
-    assert told({"energy_drift_max": 5e-3}, limits=drift) == ["energy_drift"]
+    assert kinds_of({"energy_drift_max": 5e-4}, limits=drift) == ["limit"]
+    assert kinds_of({"energy_drift_max": 5e-3}, limits=drift) == ["energy_drift"]
     ratio = {"limits": {"g": Limit(0.6, "so", at_least=True)},
              "swamped": {"g": Limit(0.2, "so", at_least=True)}}  # fmt: skip
-    assert [told(report={"g": g}, **ratio) for g in (0.7, 0.5, 0.1)] == [[], ["limit"], ["swamped"]]
-    assert told(report={"other": 1.0}, **ratio) == []  # a run that stopped before it was known
+    assert [kinds_of(report={"g": g}, **ratio) for g in (0.7, 0.5, 0.1)] == [
+        [],
+        ["limit"],
+        ["swamped"],
+    ]
+    assert kinds_of(report={"other": 1.0}, **ratio) == []  # a run that stopped before it was known

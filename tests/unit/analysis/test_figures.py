@@ -27,7 +27,7 @@ SETS = {
 
 
 @pytest.fixture(autouse=True)
-def coarse(monkeypatch):
+def low_resolution(monkeypatch):
     monkeypatch.setattr(style, "DPI", 40)
     monkeypatch.setattr(maps, "PIXELS", 48)
     monkeypatch.setattr(maps, "PIXELS_OF_MANY", 32)

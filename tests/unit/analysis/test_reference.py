@@ -172,7 +172,7 @@ def sph_(*words):
 
 
 @pytest.fixture
-def naming(tubes, tmp_path, monkeypatch):
+def config_with_reference(tubes, tmp_path, monkeypatch):
     """A configuration that names the finest tube, relative to the current directory."""
     monkeypatch.chdir(tubes)
     path = tmp_path / "tube.toml"
@@ -181,8 +181,10 @@ def naming(tubes, tmp_path, monkeypatch):
     return path
 
 
-def test_run_with_reference_ends_with_errors_against_it(naming, tubes, tmp_path, monkeypatch):
-    result = sph_("run", naming, "-o", tmp_path / "run")
+def test_run_with_reference_ends_with_errors_against_it(
+    config_with_reference, tubes, tmp_path, monkeypatch
+):
+    result = sph_("run", config_with_reference, "-o", tmp_path / "run")
     assert result.exit_code == 0, result.output
     assert f"Error (L1 against the run {tubes / 'n=800'}" in result.stdout
     found = json.loads((tmp_path / "run" / "summary.json").read_text())["errors"]
@@ -195,8 +197,10 @@ def test_run_with_reference_ends_with_errors_against_it(naming, tubes, tmp_path,
     assert json.loads((tmp_path / "again" / "summary.json").read_text())["errors"] == found
 
 
-def test_errors_against_reference_and_exact_are_distinguished(naming, tubes, tmp_path):
-    sph_("run", naming, "-o", tmp_path / "run", "--set", "problem.n=60")
+def test_errors_against_reference_and_exact_are_distinguished(
+    config_with_reference, tubes, tmp_path
+):
+    sph_("run", config_with_reference, "-o", tmp_path / "run", "--set", "problem.n=60")
     said = sph_("report", tubes / "n=50", tmp_path / "run", "-o", tmp_path / "report").stdout
     assert "Errors are not all against the same" in said
     assert "Compared: L1 error of density, weighed" in said
@@ -212,11 +216,11 @@ def test_errors_against_reference_and_exact_are_distinguished(naming, tubes, tmp
     ],
 )
 def test_run_with_unusable_reference_is_refused_at_start(
-    naming, tubes, tmp_path, setting, code, words, dry
+    config_with_reference, tubes, tmp_path, setting, code, words, dry
 ):
     target = tubes / "n=800" if "itself" in words else tmp_path / "run"
     before = sorted((tubes / "n=800" / "checkpoints").iterdir())
-    result = sph_("run", naming, "-o", target, "--force", "--set", setting, *dry)
+    result = sph_("run", config_with_reference, "-o", target, "--force", "--set", setting, *dry)
     assert result.exit_code == code
     assert words in result.stderr
     assert "Try: " in result.stderr
@@ -224,8 +228,10 @@ def test_run_with_unusable_reference_is_refused_at_start(
     assert sorted((tubes / "n=800" / "checkpoints").iterdir()) == before
 
 
-def test_restart_without_reference_is_refused_unless_dropped(naming, tubes, tmp_path):
-    sph_("run", naming, "-o", tmp_path / "run", "--set", "time.end=0.05")
+def test_restart_without_reference_is_refused_unless_dropped(
+    config_with_reference, tubes, tmp_path
+):
+    sph_("run", config_with_reference, "-o", tmp_path / "run", "--set", "time.end=0.05")
     begin = tmp_path / "run" / "checkpoints" / "checkpoint_000000.h5"
     history = (tmp_path / "run" / "history.csv").read_bytes()
     refused = sph_("restart", begin, "--set", "time.end=0.06")
@@ -236,15 +242,17 @@ def test_restart_without_reference_is_refused_unless_dropped(naming, tubes, tmp_
     assert "L1 against the exact solution" in taken_back.stdout
 
 
-def test_reference_of_other_problem_is_refused(naming):
+def test_reference_of_other_problem_is_refused(config_with_reference):
     other = configuration.from_text('[problem]\nname = "uniform"\n[time]\nend = 0.05\n')
     config = other.override(["report.reference=n=800"])
     with pytest.raises(ConfigError, match=r"has problem\.name = shock_tube, but this run has"):
         check(config, None)
 
 
-def test_run_with_reference_deleted_meanwhile_keeps_summary(naming, tubes, tmp_path):
-    config = configuration.load(naming).override([f"report.reference={tmp_path / 'gone'}"])
+def test_run_with_reference_deleted_meanwhile_keeps_summary(config_with_reference, tubes, tmp_path):
+    config = configuration.load(config_with_reference).override(
+        [f"report.reference={tmp_path / 'gone'}"]
+    )
     run = RunDirectory.create(tmp_path / "run")
     with pytest.raises(FileError, match="gone does not exist"):
         runner.run(config, run, Lines())

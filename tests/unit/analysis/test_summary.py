@@ -87,8 +87,8 @@ def test_summary_text_names_reference_or_reason_without_errors():
 
 
 @pytest.fixture
-def of_run(monkeypatch):
-    """of_run(status, reference): the summary of a simulation of which nothing is worked out."""
+def summary_of(monkeypatch):
+    """summary_of(status, reference): the summary of a simulation of which nothing is worked out."""
     for name in ("conservation", "cost"):
         monkeypatch.setattr(summary, name, lambda *_, name=name: name)
     monkeypatch.setattr(summary.errors, "against_exact", lambda *_: "errors")
@@ -114,12 +114,12 @@ def of_run(monkeypatch):
     return made
 
 
-def test_summary_finished_run_has_every_entry(of_run):
+def test_summary_finished_run_has_every_entry(summary_of):
     lineage = (
         "restarted at step 1, t = 0.125 with physics.alpha = 2.0 (was 1.0)",
         "restarted at step 2, t = 0.25",
     )
-    found = of_run("done", lineage=lineage)
+    found = summary_of("done", lineage=lineage)
     assert found.pop("version")
     assert found == {
         "status": "done", "reason": "a reason", "warnings": [{"kind": "a", "text": "b"}],
@@ -132,15 +132,15 @@ def test_summary_finished_run_has_every_entry(of_run):
     }  # fmt: skip
 
 
-def test_summary_failed_run_has_no_warnings(of_run):
-    found = of_run("failed")
+def test_summary_failed_run_has_no_warnings(summary_of):
+    found = summary_of("failed")
     assert (found["errors"], found["report"], found["nearest"]) == (None, None, None)
     assert "failed" in found["errors_left_out"]
     assert found["warnings"]
 
 
-def test_summary_errors_against_reference_only_at_end(of_run):
-    done, stopped = (of_run(status, reference="fine") for status in ("done", "stopped"))
+def test_summary_errors_against_reference_only_at_end(summary_of):
+    done, stopped = (summary_of(status, reference="fine") for status in ("done", "stopped"))
     assert (done["errors"], done["errors_left_out"]) == (None, None)
     assert (stopped["errors"], done["report"], stopped["report"]) == (None, "figures", "figures")
     assert "stopped before" in stopped["errors_left_out"]

@@ -48,15 +48,15 @@ def called(config, target, *arguments):
 
 
 @pytest.fixture(scope="module")
-def searched(tube):
+def first_search(tube):
     """The first search, and its directory."""
     target = tube.parent / "found"
     return called(tube, target, "--jobs", "2"), target
 
 
 @pytest.mark.slow
-def test_search_finds_largest_stable_courant_number(searched):
-    result, target = searched
+def test_search_finds_largest_stable_courant_number(first_search):
+    result, target = first_search
     assert result.exit_code == 0, result.output
     found = json.loads((target / "physics.C.json").read_text())
     end = found["ends"]["largest"]
@@ -81,8 +81,8 @@ def test_search_finds_largest_stable_courant_number(searched):
 
 
 @pytest.mark.slow
-def test_failed_run_is_unstable_with_reason(searched):
-    _, target = searched
+def test_failed_run_is_unstable_with_reason(first_search):
+    _, target = first_search
     trials = json.loads((target / "physics.C.json").read_text())["trials"]
     failed = [trial for trial in trials if trial["verdict"] == "failed"]
     assert failed, "the drift that is allowed is too large for this test"
@@ -93,8 +93,8 @@ def test_failed_run_is_unstable_with_reason(searched):
 
 
 @pytest.mark.slow
-def test_existing_runs_are_judged_without_running_again(searched, tube):
-    _, target = searched
+def test_existing_runs_are_judged_without_running_again(first_search, tube):
+    _, target = first_search
     before = {path: path.stat().st_mtime_ns for path in target.glob("*/summary.json")}
     words = (target / "physics.C.json").read_text()
     again = called(tube, target, "--jobs", "2")
@@ -109,8 +109,8 @@ def test_existing_runs_are_judged_without_running_again(searched, tube):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("word", ["nan", "inf"])
-def test_nan_error_is_beyond_limit(searched, tmp_path, word):
-    _, target = searched
+def test_nan_error_is_beyond_limit(first_search, tmp_path, word):
+    _, target = first_search
     run = shutil.copytree(target / "default", tmp_path / "default")
     summary = json.loads((run / "summary.json").read_text())
     summary["errors"]["fields"]["pressure"]["L1"] = word
@@ -121,8 +121,8 @@ def test_nan_error_is_beyond_limit(searched, tmp_path, word):
 
 
 @pytest.mark.slow
-def test_killed_search_continues_its_run(searched, tube):
-    _, target = searched
+def test_killed_search_continues_its_run(first_search, tube):
+    _, target = first_search
     run = target / "default"
     summary = run / "summary.json"
     before = json.loads(summary.read_text())
@@ -134,8 +134,8 @@ def test_killed_search_continues_its_run(searched, tube):
 
 
 @pytest.mark.slow
-def test_directory_of_other_configuration_is_refused(searched, tube):
-    _, target = searched
+def test_directory_of_other_configuration_is_refused(first_search, tube):
+    _, target = first_search
     result = called(tube, target, "--set", "problem.n=50")
     assert result.exit_code == 2
     assert "of another configuration" in result.stderr
@@ -171,9 +171,9 @@ def test_failed_reference_run_exits_with_3(tube, tmp_path):
 
 
 @pytest.mark.slow
-def test_refused_run_is_unstable_with_reason(searched, tube):
+def test_refused_run_is_unstable_with_reason(first_search, tube):
     """At eta = 5e4 a support takes more than a thousand images of the box."""
-    _, target = searched
+    _, target = first_search
     trials = Trials(tube, "physics.eta", (), target, Criterion(), 1)
     assert trials.are_stable([5e4]) == [False]
     assert trials.done[5e4].verdict == "failed"
@@ -203,8 +203,8 @@ def test_runs_without_exact_solution_compared_with_reference(tmp_path):
 
 
 @pytest.mark.slow
-def test_islands_of_stability_are_reported(searched, tube):
-    _, target = searched
+def test_islands_of_stability_are_reported(first_search, tube):
+    _, target = first_search
     found = command.run(tube, "physics.C", (), target, ("resolution=1.5",), 2)
     reference, default, *more = (trial.value for trial in found.trials if trial.is_stable)
     assert more
@@ -226,8 +226,8 @@ def changed(run, target, change):
 
 
 @pytest.mark.slow
-def test_energy_drift_judged_by_problem_or_reference(searched, tmp_path):
-    _, target = searched
+def test_energy_drift_judged_by_problem_or_reference(first_search, tmp_path):
+    _, target = first_search
     reference, default = target / "physics.C=0.0375", target / "default"
     judge = Judge(reference, Criterion())
     allowed = judge.state.config.problem.limits["energy_drift"].bound
@@ -247,8 +247,8 @@ def test_energy_drift_judged_by_problem_or_reference(searched, tmp_path):
 
 
 @pytest.mark.slow
-def test_problem_limits_are_judged(searched, tmp_path, monkeypatch):
-    _, target = searched
+def test_problem_limits_are_judged(first_search, tmp_path, monkeypatch):
+    _, target = first_search
     reference, default = target / "physics.C=0.0375", target / "default"
     bound = {"momentum_change": base.Limit(0.5, "a test"), "no_figure": base.Limit(1.0, "none")}
     problem = type(Judge(reference, Criterion()).state.config.problem)
@@ -312,9 +312,9 @@ def test_shortened_search_lists_skipped_runs(tmp_path):
 
 
 @pytest.mark.slow
-def test_errors_below_fraction_of_field_are_ignored(searched, tmp_path):
+def test_errors_below_fraction_of_field_are_ignored(first_search, tmp_path):
     """Against a reference without errors: of velocity, a part of the mean |v| + c_s."""
-    _, target = searched
+    _, target = first_search
 
     def exact(summary):
         for norms in summary["errors"]["fields"].values():

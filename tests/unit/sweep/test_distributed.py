@@ -51,12 +51,12 @@ def address(tmp_path):
 
 
 @pytest.mark.slow
-def test_sweep_by_dask_equals_local_sweep(killed, cluster, program, tmp_path):
+def test_sweep_by_dask_equals_local_sweep(killed_sweep, cluster, program, tmp_path):
     """Bit for bit those of a sweep that was killed and went on from checkpoints."""
     result = program.run(*TWELVE, "--scheduler", cluster.scheduler_address, "-o", tmp_path / "dask")
     assert result.exit_code == 0, result.output
     assert len(runs(tmp_path / "dask")) == 12
-    assert hashes(tmp_path / "dask") == hashes(killed.path)
+    assert hashes(tmp_path / "dask") == hashes(killed_sweep.path)
 
 
 @pytest.mark.slow

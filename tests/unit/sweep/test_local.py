@@ -33,41 +33,41 @@ def prepared(program, *varies):
 
 
 @pytest.mark.slow
-def test_killed_sweep_run_again_finishes_all_points(killed):
-    assert killed.second.exit_code == 0, killed.second.output
-    assert "12 of 12 points are done." in killed.second.stdout
-    found = summaries(killed.path)
+def test_killed_sweep_run_again_finishes_all_points(killed_sweep):
+    assert killed_sweep.second.exit_code == 0, killed_sweep.second.output
+    assert "12 of 12 points are done." in killed_sweep.second.stdout
+    found = summaries(killed_sweep.path)
     assert len(found) == 12
     assert {summary["status"] for summary in found.values()} == {"done"}
     assert {summary["time"] for summary in found.values()} == {0.4}
 
 
 @pytest.mark.slow
-def test_killed_sweep_run_again_repeats_no_work(killed):
-    assert "stopped: ended by signal 9" in killed.told
-    assert 4 <= len(killed.before) < 12  # else nothing was killed
-    for name, run in runs(killed.path).items():
-        assert attempts(killed.path, name).count("run") == 1
+def test_killed_sweep_run_again_repeats_no_work(killed_sweep):
+    assert "stopped: ended by signal 9" in killed_sweep.told
+    assert 4 <= len(killed_sweep.before) < 12  # else nothing was killed
+    for name, run in runs(killed_sweep.path).items():
+        assert attempts(killed_sweep.path, name).count("run") == 1
         steps = read_history(run.history)["step"]
         assert steps.tolist() == list(range(steps.size))
-        if name in killed.before:
-            assert run.summary.stat().st_mtime_ns == killed.before[name]
-    assert attempts(killed.path, killed.worker) == ["run", "restart"]
-    with h5py.File(runs(killed.path)[killed.worker].checkpoints()[-1]) as file:
+        if name in killed_sweep.before:
+            assert run.summary.stat().st_mtime_ns == killed_sweep.before[name]
+    assert attempts(killed_sweep.path, killed_sweep.worker) == ["run", "restart"]
+    with h5py.File(runs(killed_sweep.path)[killed_sweep.worker].checkpoints()[-1]) as file:
         (lineage,) = json.loads(file["Checkpoint"].attrs["lineage"])
     assert lineage.startswith("restarted at step")
     assert "step 0," not in lineage
 
 
 @pytest.mark.slow
-def test_finished_sweep_does_nothing(killed):
-    before = killed.done()
-    again = killed.program.run("--vary", "problem.n=40", "--vary", "physics.alpha=0.5,1.0",
-                               "-o", killed.path)  # fmt: skip
+def test_finished_sweep_does_nothing(killed_sweep):
+    before = killed_sweep.done()
+    again = killed_sweep.program.run("--vary", "problem.n=40", "--vary", "physics.alpha=0.5,1.0",
+                               "-o", killed_sweep.path)  # fmt: skip
     assert again.exit_code == 0
     assert "2 of 2 points are done already" in again.stderr
-    assert killed.done() == before
-    assert len(SweepDirectory(killed.path).plan().points) == 12
+    assert killed_sweep.done() == before
+    assert len(SweepDirectory(killed_sweep.path).plan().points) == 12
 
 
 @pytest.mark.slow
