@@ -83,14 +83,23 @@ def hashes(run):
     return found
 
 
-def assert_told(result, code, *words):
-    """That exit code, a message on stderr with these words, and no traceback."""
-    assert result.exit_code == code, result.output
-    assert isinstance(result.exception, SystemExit)
-    assert "Traceback" not in result.output
-    for word in words:
-        assert word in result.stderr
-    assert result.stdout == ""
+@pytest.fixture
+def refused(messages):
+    """refused(result, code, *facts): an error with this exit code, and a message, no traceback.
+
+    The message has each of `facts`; `mask` finds what varies in its text, which is kept.
+    """
+
+    def check(result, code, *facts, mask=None):
+        assert result.exit_code == code, result.output
+        assert isinstance(result.exception, SystemExit)
+        assert "Traceback" not in result.output
+        for fact in facts:
+            assert fact in result.stderr
+        assert result.stdout == ""
+        messages.check(result.stderr, mask)
+
+    return check
 
 
 @pytest.fixture
@@ -163,10 +172,10 @@ def test_run_with_set_and_threads(config, tmp_path):
     assert (resolved.physics.alpha, resolved.run.threads, resolved.time.end) == (2.0, 2, 0.01)
 
 
-def test_run_with_force_replaces_run(done, config, tmp_path):
+def test_run_with_force_replaces_run(refused, done, config, tmp_path):
     run = copied(done, tmp_path / "run")
     (run / "notes.txt").write_text("mine")
-    assert_told(sph_("run", config, "-o", run), 4, "holds a run already", "--force", "sph restart")
+    refused(sph_("run", config, "-o", run), 4, "--force", "sph restart")
     assert hashes(run) == hashes(done[0])
     result = sph_("run", config, "-o", run, "--force", "--set", "time.end=0.07")
     assert result.exit_code == 0
@@ -249,7 +258,13 @@ def test_new_writes_a_valid_configuration(name, tmp_path):
     assert sph_("new", name, "-o", target).stdout == f"wrote {target}\n"
     assert target.read_text() == result.stdout
     assert configuration.load(target).problem.name == name
-    assert_told(sph_("new", name, "-o", target), 4, "there already", "Try: ")
+
+
+def test_new_existing_target_exits_with_4(refused, tmp_path):
+    target = tmp_path / "new.toml"
+    target.touch()
+    refused(sph_("new", "shock_tube", "-o", target), 4, "new.toml", "Try: ")
+    assert target.read_text() == ""
 
 
 def test_configuration_from_new_runs(tmp_path):
@@ -293,12 +308,11 @@ def test_version_option():
 # --- exit code 2 ------------------------------------------------------------------------------
 
 
-def test_all_config_errors_reported_with_lines(tmp_path):
+def test_all_config_errors_reported_with_lines(refused, tmp_path):
     path = tmp_path / "bad.toml"
     path.write_text(TUBE.replace("n = 60", "n = 'many'").replace("interval", "intervall"))
     result = sph_("run", path, "-o", tmp_path / "run", "--set", "physics.C=-1")
-    assert_told(result, 2, f"{path}, line 3: problem.n", f"{path}, line 7: output.intervall")
-    assert "did you mean interval?" in result.stderr
+    refused(result, 2, f"{path}, line 3: problem.n", f"{path}, line 7: output.intervall")
     assert "--set physics.C=-1: physics.C" in result.stderr
     assert len(result.stderr.splitlines()) == 3
     assert not (tmp_path / "run").exists()
@@ -308,7 +322,7 @@ def test_all_config_errors_reported_with_lines(tmp_path):
     ("arguments", "words"),
     [
         (["--set", "physics.aplha=1.0"], ["physics.aplha", "alpha"]),
-        (["--set", "physics.alpha"], ["--set physics.alpha: expected TABLE.KEY=VALUE"]),
+        (["--set", "physics.alpha"], ["--set physics.alpha"]),
         (["--set", "physics.gamma=0.9"], ["physics.gamma", "0.9"]),
         (["--set", "physics.kernel=wendland"], ["physics.kernel", "wendland_c2"]),
         (["--set", "problem.name=shock_tub"], ["problem.name", "shock_tube"]),
@@ -318,38 +332,42 @@ def test_all_config_errors_reported_with_lines(tmp_path):
     ],
 )
 @pytest.mark.parametrize("command", ["run", "restart"])
-def test_invalid_set_option_exits_with_2(command, arguments, words, config, done, tmp_path):
+def test_invalid_set_option_exits_with_2(
+    refused, command, arguments, words, config, done, tmp_path
+):
     source = config if command == "run" else done[0]
     before = hashes(done[0])
     result = sph_(command, source, "-o", tmp_path / "new", *arguments)
-    assert_told(result, 2, *words)
+    refused(result, 2, *words, mask=r"(?s)Usage: .*")  # the words of click
     assert not (tmp_path / "new").exists()
     assert hashes(done[0]) == before
 
 
-def test_run_invalid_toml_exits_with_2(tmp_path):
+def test_run_invalid_toml_exits_with_2(refused, tmp_path):
     path = tmp_path / "bad.toml"
     path.write_text("[problem]\nname = \n")
-    assert_told(sph_("run", path), 2, f"{path}, line 2", "not valid TOML")
+    refused(sph_("run", path), 2, f"{path}, line 2", mask=r"(?<=TOML: ).*")
 
 
-def test_new_unknown_problem_exits_with_2():
-    assert_told(sph_("new", "shock_tub"), 2, 'no problem "shock_tub"', "mean shock_tube?")
+def test_new_unknown_problem_exits_with_2(refused):
+    refused(sph_("new", "shock_tub"), 2, "shock_tub", "shock_tube")
 
 
-def test_restart_impossible_change_exits_with_2(done):
+def test_restart_impossible_change_exits_with_2(refused, done):
     result = sph_("restart", done[0], "--set", "problem.n=61")
-    assert_told(result, 2, "problem.n cannot be changed")
+    refused(result, 2, "problem.n")
 
 
 # --- exit code 3 ------------------------------------------------------------------------------
 
 
-def test_numerical_failure_exits_with_3(config, tmp_path):
+def test_numerical_failure_exits_with_3(refused, config, tmp_path):
     run = tmp_path / "run"
     result = sph_("run", config, "-o", run, "--set", "physics.max_energy_drift=1e-15")
     first = run / "checkpoints" / "checkpoint_000000.h5"
-    assert_told(result, 3, "particle ", "offenders.h5", "Try: ", f"`sph restart {first} --set ")
+    facts = ("particle ", "offenders.h5", "Try: ", f"`sph restart {first} --set ")
+    # numbers of a drift at round-off, which vary by machine
+    refused(result, 3, *facts, mask=r" *-?\b\d[\d.]*(e[-+]?\d+)?\b")
     assert json.loads((run / "summary.json").read_text())["status"] == "failed"
     result = sph_(
         "restart", first, "--set", "physics.max_energy_drift=0.02", "--set", "time.end=0.01"
@@ -360,60 +378,60 @@ def test_numerical_failure_exits_with_3(config, tmp_path):
 # --- exit code 4 ------------------------------------------------------------------------------
 
 
-def test_missing_file_exits_with_4(tmp_path):
-    assert_told(sph_("run", tmp_path / "no.toml"), 4, "no.toml: there is no such file")
-    assert_told(sph_("run", tmp_path), 4, "a directory")
-    assert_told(sph_("restart", tmp_path / "no"), 4, f"{tmp_path / 'no'} does not exist")
-    assert_told(sph_("restart", tmp_path), 4, "is not a run directory")
+def test_missing_file_exits_with_4(refused, tmp_path):
+    refused(sph_("run", tmp_path / "no.toml"), 4, "no.toml")
+    refused(sph_("run", tmp_path), 4)
+    refused(sph_("restart", tmp_path / "no"), 4, str(tmp_path / "no"))
+    refused(sph_("restart", tmp_path), 4)
 
 
 @pytest.mark.parametrize("command", ["restart", "plot", "report"])
-def test_invalid_file_name_exits_with_4(command):
-    assert_told(sph_(command, "x" * 300), 4, "x" * 300, "File name too long")
+def test_invalid_file_name_exits_with_4(refused, command):
+    refused(sph_(command, "x" * 300), 4, "x" * 300)
 
 
-def test_invalid_checkpoint_exits_with_4(done, tmp_path):
+def test_invalid_checkpoint_exits_with_4(refused, done, tmp_path):
     good = (done[0] / "checkpoints" / "checkpoint_000002.h5").read_bytes()
     bad = tmp_path / "bad.h5"
     bad.write_text("not HDF5")
-    assert_told(sph_("restart", bad), 4, "is not an HDF5 file")
+    refused(sph_("restart", bad), 4, "bad.h5")
     bad.write_bytes(good[: len(good) // 2])
-    assert_told(sph_("restart", bad), 4, "is truncated or damaged")
+    refused(sph_("restart", bad), 4, "bad.h5", mask=r"Unable to .*(?=\)\.)")  # HDF5's words
     with h5py.File(tmp_path / "other.h5", "w") as file:
         file["x"] = 1.0
-    assert_told(sph_("restart", tmp_path / "other.h5"), 4, "not a checkpoint of sph")
+    refused(sph_("restart", tmp_path / "other.h5"), 4, "other.h5")
     bad.write_bytes(good)
     with h5py.File(bad, "a") as file:
         file["Checkpoint"].attrs["format_version"] = 99
-    assert_told(sph_("restart", bad), 4, "a newer format (99)", "Try: a newer sph")
+    refused(sph_("restart", bad), 4, "(99)", "Try: ")
     bad.write_bytes(good)
-    assert_told(sph_("restart", bad), 4, "not in a run directory", "-o DIR")
+    refused(sph_("restart", bad), 4, "-o DIR")
 
 
 @pytest.mark.parametrize("command", ["run", "restart"])
-def test_unwritable_directory_exits_with_4(command, config, done, tmp_path):
+def test_unwritable_directory_exits_with_4(refused, command, config, done, tmp_path):
     source = config if command == "run" else RunDirectory(done[0]).checkpoint_path(3)
     (tmp_path / "file").touch()
     for below in ("", "run"):
         result = sph_(command, source, "-o", tmp_path / "file" / below)
-        assert_told(result, 4, "file", "Try: ")
+        refused(result, 4, "file", "Try: ")
 
 
-def test_directory_of_other_files_exits_with_4(config, tmp_path):
-    assert_told(sph_("run", config, "-o", tmp_path, "--force"), 4, "is not a run directory")
+def test_directory_of_other_files_exits_with_4(refused, config, tmp_path):
+    refused(sph_("run", config, "-o", tmp_path, "--force"), 4)
     assert config.exists()
 
 
 # --- signals ----------------------------------------------------------------------------------
 
 
-def test_interrupt_while_loading_shows_no_traceback(config, monkeypatch):
+def test_interrupt_while_loading_shows_no_traceback(refused, config, monkeypatch):
     def interrupted(*_):
         raise KeyboardInterrupt
 
     monkeypatch.setattr(configuration, "load", interrupted)
     result = sph_("run", config)
-    assert_told(result, 130, "sph: ended by Ctrl-C")
+    refused(result, 130, "sph: ended by Ctrl-C")
 
 
 @pytest.mark.slow
@@ -437,7 +455,7 @@ def test_signal_during_run_writes_checkpoint_and_exits_with_75(number, config, t
     assert max(hashes(tmp_path / "run")) > last
 
 
-def test_second_interrupt_ends_at_once(config, tmp_path, monkeypatch):
+def test_second_interrupt_ends_at_once(refused, config, tmp_path, monkeypatch):
     class InterruptingProgress(progress.Lines):
         def step(self, simulation):
             signal.raise_signal(signal.SIGINT)
@@ -449,7 +467,7 @@ def test_second_interrupt_ends_at_once(config, tmp_path, monkeypatch):
         result = sph_("run", config, "-o", tmp_path / "run")
     finally:
         signal.signal(signal.SIGINT, handler)
-    assert_told(result, 130, "wrote checkpoint_000000.h5", "sph: ended by Ctrl-C")
+    refused(result, 130, "wrote checkpoint_000000.h5", "sph: ended by Ctrl-C")
 
 
 @pytest.mark.slow

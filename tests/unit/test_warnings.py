@@ -243,7 +243,7 @@ def texts_of(monkeypatch):
     return made
 
 
-def test_warning_text_has_numbers_of_run(texts_of):
+def test_warning_text_has_numbers_of_run(messages, texts_of):
     alone = FakeSimulation()
     alone.held_supports = 3
     wrong = {"energy_drift_max": 0.0213, "momentum_change": 0.5, "volume_ratio": 0.8}
@@ -251,15 +251,17 @@ def test_warning_text_has_numbers_of_run(texts_of):
     assert list(found) == [
         "energy_drift", "momentum", "volume", "held_supports", "resolution", "paired",
     ]  # fmt: skip
-    assert "drifted by 2.1 %, more than 0.1 %" in found["energy_drift"]
-    assert "changed by 0.5 of" in found["momentum"]
-    # densities are as much too high as volumes are too small: 1/0.8
-    assert "m/rho is 0.8 of" in found["volume"]
-    assert "by 25 %" in found["volume"]
-    assert "3 of 40 particles" in found["held_supports"]
-    assert "held at 0.125" in found["held_supports"]
-    assert found["resolution"] == "far from 0"
-    assert "neighbour is 0.25 of" in found["paired"]
+    numbers = {
+        "energy_drift": ["2.1 %", "0.1 %"],
+        "momentum": ["0.5"],
+        "volume": ["0.8", "25 %"],  # densities are too high by what volumes are too small: 1/0.8
+        "held_supports": ["3", "40", "0.125"],
+        "resolution": ["far from 0"],
+        "paired": ["0.25"],
+    }
+    for kind, expected in numbers.items():
+        assert all(number in found[kind] for number in expected), kind
+    messages.check("\n".join(f"{kind}: {text}" for kind, text in found.items()))
 
 
 @pytest.mark.parametrize("wrong", ["momentum_change", "volume_ratio"])
@@ -273,20 +275,23 @@ def test_pairs_judged_by_median_not_single_pair(texts_of):
     assert "paired" not in texts_of(nearest=None)  # of a run that failed
 
 
-def test_limit_warning_has_side_and_reason(texts_of):
+def test_limit_warning_has_side_and_reason(messages, texts_of):
     limits = {"high": Limit(2.0, "as so"), "low": Limit(2.0, "as so", at_least=True)}
     found = texts_of(FakeSimulation(limits=limits), report={"high": 2.5, "low": 2.5})
-    assert found["limit"] == "high is 2.5, above the limit of 2 (as so)."
+    assert found["limit"].startswith("high ")
+    messages.check(found["limit"])
     found = texts_of(FakeSimulation(limits=limits), report={"high": 1.5, "low": 1.5})
-    assert found["limit"] == "low is 1.5, below the limit of 2 (as so)."
+    assert found["limit"].startswith("low ")
+    messages.check(found["limit"])
     assert "limit" not in texts_of(FakeSimulation(limits=limits), report={"high": 2.0, "low": 2.0})
 
 
-def test_lost_signal_warning_comes_first(texts_of):
+def test_lost_signal_warning_comes_first(messages, texts_of):
     lost = FakeSimulation(swamped={"wave": Limit(0.5, "half of it")})
     found = texts_of(lost, report={"wave": 0.75}, conservation=KEPT | {"energy_drift_max": 1.0})
     assert list(found)[:2] == ["swamped", "energy_drift"]
-    assert "wave is 0.75, above the limit of 0.5 (half of it)" in found["swamped"]
+    assert "0.75" in found["swamped"]
+    messages.check(found["swamped"])
 
 
 def test_limit_warning_without_lost_signal(kinds_of):

@@ -160,41 +160,41 @@ def test_evolution_spans_first_to_last_checkpoint(tube):
 # --- errors -----------------------------------------------------------------------------------
 
 
-def test_draw_missing_run_is_refused(tmp_path):
-    with pytest.raises(FileError, match="does not exist"):
+def test_draw_missing_run_is_refused(messages, tmp_path):
+    with messages.raised(FileError):
         figures.draw([tmp_path / "none"])
 
 
-def test_draw_directory_without_run_is_refused(tmp_path):
-    with pytest.raises(FileError, match="is not a run directory"):
+def test_draw_directory_without_run_is_refused(messages, tmp_path):
+    with messages.raised(FileError):
         figures.draw([tmp_path])
 
 
-def test_draw_run_without_checkpoints_is_refused(tmp_path):
+def test_draw_run_without_checkpoints_is_refused(messages, tmp_path):
     run = RunDirectory.create(tmp_path / "run")
-    with pytest.raises(FileError, match="has no checkpoints"):
+    with messages.raised(FileError):
         figures.draw([run.path])
 
 
-def test_draw_unknown_suffix_is_refused_before_reading(tmp_path):
+def test_draw_unknown_suffix_is_refused_before_reading(messages, tmp_path):
     for name in ("picture.gif", "picture"):
-        with pytest.raises(ConfigError, match=r"\.png, \.pdf or \.svg"):
+        with messages.raised(ConfigError):
             figures.draw([tmp_path / "none"], tmp_path / name)
 
 
-def test_draw_unwritable_target_is_refused(tube, tmp_path):
-    with pytest.raises(FileError, match="cannot write"):
+def test_draw_unwritable_target_is_refused(messages, tube, tmp_path):
+    with messages.raised(FileError):
         figures.draw([tube.path], tmp_path / "nowhere" / "picture.png")
 
 
-def test_draw_unwritable_figures_directory_is_refused(tube):
+def test_draw_unwritable_figures_directory_is_refused(messages, tube):
     tube.figures.write_text("a file in its place")
-    with pytest.raises(FileError, match="cannot write"):
+    with messages.raised(FileError):
         figures.draw([tube.path])
 
 
-def test_draw_maps_with_profiles_is_refused(tube, shear, tmp_path):
-    with pytest.raises(ConfigError, match="maps with profiles along x"):
+def test_draw_maps_with_profiles_is_refused(messages, tube, shear, tmp_path):
+    with messages.raised(ConfigError):
         figures.draw([tube.path, shear.path], tmp_path / "both.png")
 
 
@@ -406,15 +406,15 @@ def test_axis_number_text(value, text):
     assert style.number(value) == text
 
 
-def test_picture_target_link_is_refused(tube, tmp_path):
+def test_picture_target_link_is_refused(messages, tube, tmp_path):
     (tmp_path / "elsewhere").mkdir()
     tube.figures.symlink_to(tmp_path / "elsewhere")
-    with pytest.raises(FileError, match="figures is a symbolic link"):
+    with messages.raised(FileError):
         figures.draw([tube.path])
     assert not list((tmp_path / "elsewhere").iterdir())
 
 
-def test_evolution_of_two_problems_is_refused(tube, shear):
+def test_evolution_of_two_problems_is_refused(messages, tube, shear):
     shutil.copy(shear.checkpoint_path(0), tube.checkpoint_path(0))
-    with pytest.raises(FileError, match=r"is not of this run: problem\.name"):
+    with messages.raised(FileError, "problem.name"):
         list(find_source(tube.path).over_time(6))

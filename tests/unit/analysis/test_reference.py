@@ -150,17 +150,17 @@ def test_errors_command_accepts_reference(tubes, tmp_path):
     assert "Compared: L1 error of density against the run n=800" in result.stdout
 
 
-def test_reference_without_matching_checkpoint_is_refused(tubes, tmp_path):
+def test_reference_without_matching_checkpoint_is_refused(messages, tubes, tmp_path):
     text = (tubes / "n=50" / "config.toml").read_text()
     other = RunDirectory.create(tmp_path / "other")
     config = configuration.from_text(text).override(["time.end=0.02"])
     runner.run(config, other, Lines())
-    with pytest.raises(ConfigError, match=r"has no checkpoint at t = 0\.05"):
+    with messages.raised(ConfigError):
         errors_of(tubes / "n=50", Reference(other.path))
-    with pytest.raises(FileError, match="is not a run directory"):
+    with messages.raised(FileError):
         Reference(tubes)
     (other.path / "checkpoints" / "checkpoint_000000.h5").write_text("damaged")
-    with pytest.raises(FileError, match="is not an HDF5 file"):
+    with messages.raised(FileError):
         Reference(other.path).at(0.0)
 
 
@@ -242,19 +242,21 @@ def test_restart_without_reference_is_refused_unless_dropped(
     assert "L1 against the exact solution" in taken_back.stdout
 
 
-def test_reference_of_other_problem_is_refused(config_with_reference):
+def test_reference_of_other_problem_is_refused(messages, config_with_reference):
     other = configuration.from_text('[problem]\nname = "uniform"\n[time]\nend = 0.05\n')
     config = other.override(["report.reference=n=800"])
-    with pytest.raises(ConfigError, match=r"has problem\.name = shock_tube, but this run has"):
+    with messages.raised(ConfigError, "problem.name"):
         check(config, None)
 
 
-def test_run_with_reference_deleted_meanwhile_keeps_summary(config_with_reference, tubes, tmp_path):
+def test_run_with_reference_deleted_meanwhile_keeps_summary(
+    messages, config_with_reference, tubes, tmp_path
+):
     config = configuration.load(config_with_reference).override(
         [f"report.reference={tmp_path / 'gone'}"]
     )
     run = RunDirectory.create(tmp_path / "run")
-    with pytest.raises(FileError, match="gone does not exist"):
+    with messages.raised(FileError):
         runner.run(config, run, Lines())
     found = json.loads(run.summary.read_text())
     assert (found["status"], found["errors"]) == ("done", None)

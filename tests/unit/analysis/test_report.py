@@ -279,23 +279,26 @@ def test_compare_without_usable_runs_gives_empty_report(tmp_path):
     reports.write(report, tmp_path / "out")
 
 
-def test_compare_unknown_field_key_or_directory_is_refused(study, tmp_path):
-    with pytest.raises(ConfigError, match=r"--field entropy: .* density, report.radius_error"):
+PYTHON_SAYS = r"(?<=cannot be read: ).*"  # differs between versions
+
+
+def test_compare_unknown_field_key_or_directory_is_refused(messages, study, tmp_path):
+    with messages.raised(ConfigError, "--field entropy", "report.radius_error"):
         compared(study, field="entropy")
-    with pytest.raises(ConfigError, match=r"--by physics\.aplha: .* problem.n, physics.alpha"):
+    with messages.raised(ConfigError, "--by physics", "problem.n", "physics.alpha"):
         compared(study, by=("physics.aplha",))
-    with pytest.raises(FileError, match="does not exist"):
+    with messages.raised(FileError):
         compared(tmp_path / "nowhere")
     (tmp_path / "empty").mkdir()
-    with pytest.raises(FileError, match="holds no runs"):
+    with messages.raised(FileError):
         compared(tmp_path / "empty")
     point = study / "n=100,alpha=1.0"
     for text in ("{", "[]", '{"status": "done"}', '{"status": "done", "reason": "", "cost": 1}'):
         (point / "summary.json").write_text(text)
-        with pytest.raises(FileError, match=r"summary\.json cannot be read"):
+        with messages.raised(FileError, "summary.json", mask=PYTHON_SAYS):
             compared(study)
     (point / "config.toml").write_text("problem = 1\n")
-    with pytest.raises(FileError, match=r"config\.toml cannot be read"):
+    with messages.raised(FileError, "config.toml", mask=PYTHON_SAYS):
         compared(study)
 
 

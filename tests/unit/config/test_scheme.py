@@ -22,7 +22,7 @@ def physics(scheme, gas):
     ).physics
 
 
-def test_pressure_energy_with_other_gas_is_refused(tmp_path, monkeypatch):
+def test_pressure_energy_with_other_gas_is_refused(messages, tmp_path, monkeypatch):
     (tmp_path / "liquid.py").write_text(LIQUID)
     monkeypatch.setattr(eos, "__path__", [*eos.__path__, str(tmp_path)])
     liquid, gas = (
@@ -35,32 +35,32 @@ def test_pressure_energy_with_other_gas_is_refused(tmp_path, monkeypatch):
     stiffened = 'eos = { name = "stiffened_gas", gamma = 4.4, p_inf = 1.0 }'
     assert physics("variational", stiffened).eos_model().p_inf == 1
     for other in (liquid, stiffened):
-        with pytest.raises(ConfigError, match=r'"pressure_energy": expected an .*, not \{ name'):
+        with messages.raised(ConfigError):
             physics("pressure_energy", other)
 
 
 @pytest.mark.parametrize(
     "problem", ["sound_wave", "gresho", "yee", "noh", "point_explosion", "expanding_ball"]
 )
-def test_problem_for_ideal_gas_with_other_gas_is_refused(problem):
+def test_problem_for_ideal_gas_with_other_gas_is_refused(messages, problem):
     def read(p_inf):
         gas = f'{{ name = "stiffened_gas", gamma = 1.4, p_inf = {p_inf} }}'
         return config.from_text(f'[problem]\nname = "{problem}"\n[physics]\neos = {gas}\n', "a")
 
-    with pytest.raises(ConfigError, match=rf"line 4: physics.eos = .* an ideal gas for {problem}"):
+    with messages.raised(ConfigError, "line 4: physics.eos", problem):
         read(1.0)
     assert read(0.0).physics.eos_model().gamma == 1.4
 
 
 @pytest.mark.parametrize("gas", ["gamma = 7.0", 'eos = { name = "ideal_gas", gamma = 7.5 }'])
-def test_point_explosion_gamma_at_least_7_in_3d_is_refused(gas):
+def test_point_explosion_gamma_at_least_7_in_3d_is_refused(messages, gas):
     """Its solution ends at gamma = 7 in 3-D, and a run would end in that error."""
 
     def read(dimension, gas):
         head = f'[problem]\nname = "point_explosion"\ndimension = {dimension}\n[physics]\n'
         return config.from_text(head + gas, "a").physics
 
-    with pytest.raises(ConfigError, match=r"line 5: physics\..* expected gamma below 7 for point_"):
+    with messages.raised(ConfigError, "line 5"):
         read(3, gas)
     assert read(2, gas).eos_model().gamma >= 7.0
     assert read(3, "gamma = 6.9").gamma == 6.9
@@ -79,14 +79,13 @@ MASS = 'external = { name = "point_mass", mass = 1.0 }'
         ('"open"', False),
     ],
 )
-def test_point_mass_in_periodic_box_is_refused(boundary, is_wrong):
+def test_point_mass_in_periodic_box_is_refused(messages, boundary, is_wrong):
     text = f'[problem]\nname = "uniform"\nboundary = {boundary}\n[physics]\n{MASS}\n'
     if not is_wrong:
         assert config.from_text(text).physics.external_model().mass == 1.0
         return
-    with pytest.raises(ConfigError, match=r"line 5: physics.external = .* no periodic images") as e:
+    with messages.raised(ConfigError, "line 5: physics.external", "Try: "):
         config.from_text(text, "a")
-    assert "Try: " in str(e.value)
 
 
 @pytest.mark.parametrize(
@@ -97,14 +96,13 @@ def test_point_mass_in_periodic_box_is_refused(boundary, is_wrong):
         ('conductivity = "approach"', False),
     ],
 )
-def test_conductivity_active_in_equilibrium_with_external_field_is_refused(conductivity, is_wrong):
+def test_conductivity_active_in_equilibrium_with_external_field_is_refused(
+    messages, conductivity, is_wrong
+):
     text = f'[problem]\nname = "uniform"\nboundary = "open"\n[physics]\n{conductivity}\n'
     assert config.from_text(text).physics.conductivity is not None
     if not is_wrong:
         assert config.from_text(text + MASS).physics.external is not None
         return
-    with pytest.raises(
-        ConfigError, match=r"line 5: physics.conductivity = .*physics.external"
-    ) as e:
+    with messages.raised(ConfigError, "line 5: physics.conductivity", "physics.external", "Try: "):
         config.from_text(text + MASS, "a")
-    assert 'Try: "approach"' in str(e.value)

@@ -27,18 +27,21 @@ def written(tmp_path, make_state):
     return path
 
 
-def refused(path, *words):
-    """The message of the FileError that reading `path` ends in: one sentence and what to try."""
-    with pytest.raises(FileError) as caught:
-        checkpoint.read(path)
-    message = str(caught.value)
-    assert caught.value.exit_code == 4
-    assert str(path) in message
-    assert len(message.splitlines()) == 2
-    assert message.splitlines()[1].startswith("Try: ")
-    for word in words:
-        assert word in message
-    return message
+HDF5_SAYS = r"Unable to .*(?=\)\.)"  # differs between versions of HDF5
+
+
+@pytest.fixture
+def refused(messages):
+    """refused(path): reading `path` is an error of one sentence and what to try."""
+
+    def check(path, mask=None):
+        with messages.raised(FileError, path, mask=mask) as caught:
+            checkpoint.read(path)
+        assert caught.value.exit_code == 4
+        assert len(str(caught.value).splitlines()) == 2
+        assert "\nTry: " in str(caught.value)
+
+    return check
 
 
 def seal(path):
@@ -126,56 +129,56 @@ def test_state_hash_depends_on_values_names_types_and_shapes():
     assert checkpoint.state_hash(dict(reversed(state.items()))) == checkpoint.state_hash(state)
 
 
-def test_read_missing_file_is_refused(tmp_path):
-    refused(tmp_path / "no.h5", "there is no checkpoint")
+def test_read_missing_file_is_refused(refused, tmp_path):
+    refused(tmp_path / "no.h5")
 
 
-def test_read_directory_is_refused(tmp_path):
-    refused(tmp_path, "cannot read", "directory")
+def test_read_directory_is_refused(refused, tmp_path):
+    refused(tmp_path)
 
 
-def test_read_file_not_hdf5_is_refused(tmp_path):
+def test_read_file_not_hdf5_is_refused(refused, tmp_path):
     path = tmp_path / "a.h5"
     for content in (b"", b"[problem]\n"):
         path.write_bytes(content)
-        refused(path, "not an HDF5 file")
+        refused(path)
 
 
-def test_read_hdf5_of_other_program_is_refused(tmp_path):
+def test_read_hdf5_of_other_program_is_refused(refused, tmp_path):
     path = tmp_path / "a.h5"
     h5py.File(path, "w").close()
-    refused(path, "not a checkpoint of sph")
+    refused(path)
 
 
 @pytest.mark.parametrize("share", [0.0005, 0.1, 0.9, 0.99])
-def test_read_truncated_file_is_refused(written, share):
+def test_read_truncated_file_is_refused(refused, written, share):
     content = written.read_bytes()
     written.write_bytes(content[: int(share * len(content))])
-    refused(written, "truncated or damaged")
+    refused(written, mask=HDF5_SAYS)
     with pytest.raises(files.Damaged):
         checkpoint.read(written)
 
 
-def test_read_flipped_bit_in_array_is_refused(written):
+def test_read_flipped_bit_in_array_is_refused(refused, written):
     with h5py.File(written) as file:
         offset = file["Checkpoint/velocity"].id.get_offset()
     damage(written, offset + 100)
-    refused(written, "damaged")
+    refused(written)
 
 
-def test_read_flipped_bit_in_number_is_refused(written):
+def test_read_flipped_bit_in_number_is_refused(refused, written):
     with h5py.File(written) as file:
         offset = file["Checkpoint/time"].id.get_offset()
     damage(written, offset)
-    refused(written, "its content does not match the SHA-256 at its end")
+    refused(written)
     unseal(written)
-    refused(written, "the state does not match its SHA-256")
+    refused(written)
 
 
-def test_read_flipped_bit_in_configuration_is_refused(written):
+def test_read_flipped_bit_in_configuration_is_refused(refused, written):
     damage(written, written.read_bytes().index(b"eta = 1.5"))
     unseal(written)
-    refused(written, "the configuration does not match its SHA-256")
+    refused(written)
 
 
 def test_read_flipped_bit_anywhere_found_by_checksum(written, monkeypatch):
@@ -186,7 +189,8 @@ def test_read_flipped_bit_anywhere_found_by_checksum(written, monkeypatch):
     for offset in np.random.default_rng(3).integers(len(stored.SIGNATURE), end, size=50):
         written.write_bytes(whole)
         damage(written, offset)
-        refused(written, "its content does not match the SHA-256 at its end")
+        with pytest.raises(files.Damaged):
+            checkpoint.read(written)
 
 
 def test_read_older_file_without_checksum_succeeds(written, make_state):
@@ -207,15 +211,16 @@ def test_read_zeroed_sector_without_checksum_harmless_or_refused(written, make_s
 
 
 @pytest.mark.parametrize(
-    ("program", "limits", "words"),
+    ("program", "limits"),
     [
-        ("while True: pass", {"SECONDS": 0.5, "PATIENCE": 100}, "HDF5 fails at it"),
-        ("bytearray(1 << 30)", {"MEMORY": 100 << 20}, "HDF5 fails at it"),
-        ("os.kill(os.getpid(), 11)", {}, "HDF5 fails at it"),
-        ("__import__('time').sleep(60)", {"SECONDS": 0.2}, "HDF5 does not come to an end"),
+        ("while True: pass", {"SECONDS": 0.5, "PATIENCE": 100}),
+        ("bytearray(1 << 30)", {"MEMORY": 100 << 20}),
+        ("os.kill(os.getpid(), 11)", {}),
+        ("__import__('time').sleep(60)", {"SECONDS": 0.2}),
     ],
+    ids=["CPU time", "memory", "crash", "wall-clock time"],
 )
-def test_inspecting_process_has_limits(written, monkeypatch, program, limits, words):
+def test_inspecting_process_has_limits(refused, written, monkeypatch, program, limits):
     """What HDF5 does on some damaged files, done by a stand-in for it."""
     unseal(written)
     source = Path(stored.__file__).read_text()
@@ -229,7 +234,7 @@ def test_inspecting_process_has_limits(written, monkeypatch, program, limits, wo
     path = written.parent / "stand_in.py"
     path.write_text(stand_in)
     monkeypatch.setattr(stored, "__file__", str(path))
-    refused(written, words)
+    refused(written)
 
 
 def test_read_locked_file_succeeds(written, make_state):
@@ -240,12 +245,12 @@ def test_read_locked_file_succeeds(written, make_state):
         assert checkpoint.read(written).time == make_state().time
 
 
-def test_read_unreadable_file_not_called_damaged(written, monkeypatch):
+def test_read_unreadable_file_not_called_damaged(messages, written, monkeypatch):
     def fail(*_):
         raise OSError(errno.EIO, "Input/output error")
 
     monkeypatch.setattr(checkpoint, "is_sealed", fail)
-    with pytest.raises(FileError, match=r"cannot read .*: Input/output error") as caught:
+    with messages.raised(FileError) as caught:
         checkpoint.read(written)
     assert not isinstance(caught.value, files.Damaged)
 
@@ -288,77 +293,74 @@ def linked(link):
 
 
 STRANGE = {
-    "longer": (replaced("mass", data=np.ones(51)), "mass has the shape (51,), expected (50,)"),
-    "half": (replaced("omega", data=np.ones(25)), "omega has the shape (25,)"),
-    "complex": (replaced("mass", data=np.ones(50, complex)), "mass is of type <c16"),
-    "big-endian": (replaced("mass", data=np.ones(50, ">f8")), "mass is of type >f8"),
-    "text": (replaced("mass", data=[b"a"] * 50), "mass is of type"),
-    "scalar": (replaced("mass", data=1.0), "mass has the shape ()"),
-    "null": (replaced("mass", data=h5py.Empty("f8")), "mass has the shape None"),
-    "time": (replaced("time", data=np.nan), "time = nan"),
-    "step": (replaced("step", data=1e300), "step is of type <f8"),
-    "steps": (replaced("step", data=2**63 - 1), "step = 9223372036854775807"),
-    "negative": (replaced("step", data=-1), "step = -1"),
-    "no step": (replaced("next_step", data=0.0), "next_step = 0.0"),
-    "skin": (replaced("list_skin", data=1e9), "list_skin = 1000000000.0"),
-    "IDs": (replaced("id", data=np.ones(50, int)), "IDs are not all different"),
-    "nan": (replaced("velocity", data=np.full((2, 50), np.nan)), "velocity is not finite"),
-    "support": (replaced("support", data=np.zeros(50)), "support is not above 0"),
-    "cold": (replaced("internal_energy", data=-np.ones(50)), "internal_energy is below 0"),
-    "away": (replaced("list_position", data=np.full((2, 50), 9.0)), "list_position is outside"),
-    "far": (replaced("position", data=np.full((2, 50), 1e200)), "position is outside the domain"),
-    "3-D": (replaced("position", data=np.zeros((3, 50))), "position has the shape (3, 50)"),
-    "empty": (replaced("mass", data=None, shape=(10**9,), dtype=float, chunks=(1000,)),
-              "mass is not stored in full"),
-    "bomb": (replaced("mass", data=np.ones(10**6), compression="gzip"), "compressed"),
-    "chunks": (
-        replaced("mass", data=None, shape=(50,), dtype=float, chunks=(10**8,), maxshape=(None,)),
-        "chunks larger than the file",
+    "longer": replaced("mass", data=np.ones(51)),
+    "half": replaced("omega", data=np.ones(25)),
+    "complex": replaced("mass", data=np.ones(50, complex)),
+    "big-endian": replaced("mass", data=np.ones(50, ">f8")),
+    "text": replaced("mass", data=[b"a"] * 50),
+    "scalar": replaced("mass", data=1.0),
+    "null": replaced("mass", data=h5py.Empty("f8")),
+    "time": replaced("time", data=np.nan),
+    "step": replaced("step", data=1e300),
+    "steps": replaced("step", data=2**63 - 1),
+    "negative": replaced("step", data=-1),
+    "no step": replaced("next_step", data=0.0),
+    "skin": replaced("list_skin", data=1e9),
+    "IDs": replaced("id", data=np.ones(50, int)),
+    "nan": replaced("velocity", data=np.full((2, 50), np.nan)),
+    "support": replaced("support", data=np.zeros(50)),
+    "cold": replaced("internal_energy", data=-np.ones(50)),
+    "away": replaced("list_position", data=np.full((2, 50), 9.0)),
+    "far": replaced("position", data=np.full((2, 50), 1e200)),
+    "3-D": replaced("position", data=np.zeros((3, 50))),
+    "empty": replaced("mass", data=None, shape=(10**9,), dtype=float, chunks=(1000,)),
+    "bomb": replaced("mass", data=np.ones(10**6), compression="gzip"),
+    "chunks": replaced(
+        "mass", data=None, shape=(50,), dtype=float, chunks=(10**8,), maxshape=(None,)
     ),
-    "outside": (in_a_raw_file, "stored in another file"),
-    "virtual": (virtual, "stored in another file"),
-    "link": (linked(h5py.ExternalLink("pipe", "/mass")), "mass is a link"),
-    "soft": (linked(h5py.SoftLink("/PartType0/Masses")), "mass is a link"),
-    "more": (lambda group: group.create_dataset("more", data=1.0), "not the datasets"),
-    "less": (lambda group: group.pop("mass"), "mass missing"),
-    "alpha": (lambda group: group.create_dataset("alpha", data=np.ones(50)), "alpha is there"),
-    "format": (lambda group: group.attrs.update(format_version=[1, 2]), "format_version"),
-    "lineage": (lambda group: group.attrs.update(lineage="{}"), "lineage"),
-    "text array": (lambda group: group.attrs.update(configuration=["a"] * 9), "configuration"),
+    "outside": in_a_raw_file,
+    "virtual": virtual,
+    "link": linked(h5py.ExternalLink("pipe", "/mass")),
+    "soft": linked(h5py.SoftLink("/PartType0/Masses")),
+    "more": lambda group: group.create_dataset("more", data=1.0),
+    "less": lambda group: group.pop("mass"),
+    "alpha": lambda group: group.create_dataset("alpha", data=np.ones(50)),
+    "format": lambda group: group.attrs.update(format_version=[1, 2]),
+    "lineage": lambda group: group.attrs.update(lineage="{}"),
+    "text array": lambda group: group.attrs.update(configuration=["a"] * 9),
 }  # fmt: skip
 
 
 @pytest.mark.parametrize("what", STRANGE)
-def test_read_unexpected_structure_is_refused_first(written, what, monkeypatch):
+def test_read_unexpected_structure_is_refused_first(refused, written, what, monkeypatch):
     """Sealed and with a matching hash, as a stranger can make it; "pipe" would block for ever."""
     monkeypatch.chdir(written.parent)
     os.mkfifo("pipe")
-    change, words = STRANGE[what]
     with h5py.File(written, "r+") as file:
         group = file["Checkpoint"]
-        change(group)
+        STRANGE[what](group)
         with contextlib.suppress(Exception):
             hashable = what not in ("outside", "virtual", "link", "empty", "chunks")
             state = {name: one[()] for name, one in group.items()} if hashable else {}
             group.attrs["sha256"] = checkpoint.state_hash(state)
     seal(written)
-    refused(written, words)
+    refused(written)
 
 
 @pytest.mark.parametrize(
     "link", [h5py.SoftLink("/Header"), h5py.ExternalLink("pipe", "/Checkpoint")]
 )
-def test_read_linked_group_is_refused(written, link, monkeypatch):
+def test_read_linked_group_is_refused(refused, written, link, monkeypatch):
     monkeypatch.chdir(written.parent)
     os.mkfifo("pipe")
     with h5py.File(written, "r+") as file:
         del file["Checkpoint"]
         file["Checkpoint"] = link
     seal(written)
-    refused(written, "no group /Checkpoint")
+    refused(written)
 
 
-def test_read_file_without_particles_is_refused(tmp_path, make_state):
+def test_read_file_without_particles_is_refused(refused, tmp_path, make_state):
     path = tmp_path / "a.h5"
     state = make_state()
     state.particles = Particles(**{n: a[..., :0] for n, a in state.particles.arrays().items()})
@@ -368,7 +370,7 @@ def test_read_file_without_particles_is_refused(tmp_path, make_state):
     with h5py.File(path, "w") as file:
         group = file.create_group("Checkpoint")
         checkpoint._write_private(group, state, checkpoint._state(state), digest)
-    refused(path, "0 particles")
+    refused(path)
 
 
 def test_stored_fields_match_particles():
@@ -379,26 +381,26 @@ def test_stored_fields_match_particles():
     }
 
 
-@pytest.mark.parametrize(("version", "word"), [(0, "an older"), (1000, "a newer")])
-def test_read_other_format_version_is_refused(written, version, word):
+@pytest.mark.parametrize("version", [0, 1000])
+def test_read_other_format_version_is_refused(refused, written, version):
     with h5py.File(written, "r+") as file:
         file["Checkpoint"].attrs["format_version"] = version
-    refused(written, word, f"({version})", f"({checkpoint.FORMAT_VERSION})")
+    refused(written)
 
 
-def test_read_invalid_configuration_is_refused(written):
+def test_read_invalid_configuration_is_refused(messages, written):
     with h5py.File(written, "r+") as file:
         attributes = file["Checkpoint"].attrs
         text = attributes["configuration"].replace("eta = ", "etta = ")
         attributes["configuration"] = text
         attributes["configuration_sha256"] = checkpoint._text_hash(text)
-    with pytest.raises(FileError, match="etta"):
+    with messages.raised(FileError):
         checkpoint.read(written)
 
 
-def test_write_unwritable_directory_is_refused(tmp_path, make_state):
+def test_write_unwritable_directory_is_refused(messages, tmp_path, make_state):
     (tmp_path / "checkpoints").touch()
-    with pytest.raises(FileError, match=r"cannot write .*: Not a directory"):
+    with messages.raised(FileError):
         checkpoint.write(tmp_path / "checkpoints" / "checkpoint_000000.h5", make_state())
 
 

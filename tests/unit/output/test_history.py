@@ -105,29 +105,30 @@ def test_truncated_last_line_is_ignored_and_overwritten(history):
 
 
 @pytest.mark.parametrize(
-    ("content", "word"),
+    ("content", "fact"),
     [
-        (None, "there is no history"),
-        (b"", "not a history"),
-        (b"x,y\n1,2\n", "not a history"),
+        (None, ""),
+        (b"", ""),
+        (b"x,y\n1,2\n", ""),
         (b"step,t\n1,2\n3\n", "line 3"),
         (b"step,t\n1,two\n", "line 2"),
-        (b"\xff\xfe\n", "cannot read"),
+        (b"\xff\xfe\n", ""),
     ],
+    ids=["missing", "empty", "other columns", "short row", "word for number", "not text"],
 )
-def test_read_invalid_history_is_refused(tmp_path, content, word):
+def test_read_invalid_history_is_refused(messages, tmp_path, content, fact):
     path = tmp_path / "history.csv"
     if content is not None:
         path.write_bytes(content)
     for use in (read, lambda path: History.resume(path, 0)):
-        with pytest.raises(FileError, match=word):
+        with messages.raised(FileError, path, fact):
             use(path)
     assert content is None or path.read_bytes() == content
 
 
-def test_create_in_unwritable_directory_is_refused(tmp_path):
+def test_create_in_unwritable_directory_is_refused(messages, tmp_path):
     (tmp_path / "run").touch()
-    with pytest.raises(FileError, match="cannot write"):
+    with messages.raised(FileError):
         History.create(tmp_path / "run" / "history.csv", 1)
 
 
@@ -148,19 +149,19 @@ def test_rows_are_synced_before_checkpoint(history, monkeypatch):
     assert read(history.path)["step"].tolist() == [0, 1, 2]
 
 
-def test_append_to_replaced_history_is_refused(history):
+def test_append_to_replaced_history_is_refused(messages, history):
     append(history, range(2))
     history.path.rename(history.path.with_name("moved"))
     history.path.write_text("of another run")
-    with pytest.raises(FileError, match="moved, deleted or replaced"):
+    with messages.raised(FileError):
         history.flush()
     assert history.path.read_text() == "of another run"
     history._lines.truncate(0)  # for the end of the test, which closes
 
 
 @pytest.mark.parametrize("header", ["step,t", "step,t,t", "t,step"])
-def test_read_truncated_header_is_refused(tmp_path, header):
+def test_read_truncated_header_is_refused(messages, tmp_path, header):
     path = tmp_path / "history.csv"
     path.write_text(f"{header}\n")
-    with pytest.raises(FileError, match=r"(lacks the columns dt, |is not a history).*\nTry: "):
+    with messages.raised(FileError):
         read(path)

@@ -167,32 +167,35 @@ def test_bound_holds_inside_only(bound, inside, outside):
         assert bound.closeness(value) >= 1.0
 
 
+PYDANTIC_SAYS = r"\[type=.*|.*pydantic\.dev.*"  # differs between versions of pydantic
+
+
 @pytest.mark.parametrize(
-    ("old", "new", "said"),
+    ("old", "new", "fact"),
     [
-        ("at_most = 2.0, ", "", "expected at_most, at_least or both"),
+        ("at_most = 2.0, ", "", "at_least"),
         ("[settings.right]", "[[settings]]", "settings"),
         ("title = ", "tilte = ", "tilte"),
         ("history.max_density.max", "history.max_density.max", None),
     ],
 )
-def test_invalid_case_file_is_refused(old, new, said, tmp_path):
+def test_invalid_case_file_is_refused(messages, old, new, fact, tmp_path):
     path = tmp_path / "case.toml"
     path.write_text(STILL.replace(old, new))
-    if said is None:
+    if fact is None:
         assert cases.read(path).name == "case"
         return
-    with pytest.raises(FileError, match=said):
+    with messages.raised(FileError, fact, mask=PYDANTIC_SAYS):
         cases.read(path)
 
 
-def test_case_with_no_expected_pass_is_refused(tmp_path):
+def test_case_with_no_expected_pass_is_refused(messages, tmp_path):
     path = tmp_path / "case.toml"
     path.write_text(STILL + 'fails = { limit = "conservation.energy_drift_max", because = "so" }\n')
-    with pytest.raises(FileError, match="no setting is expected to pass"):
+    with messages.raised(FileError, mask=PYDANTIC_SAYS):
         cases.read(path)
     path.write_text(STILL + 'fails = { limit = "report.none", because = "so" }\n')
-    with pytest.raises(FileError, match="which has no limit"):
+    with messages.raised(FileError, mask=PYDANTIC_SAYS):
         cases.read(path)
 
 
@@ -215,8 +218,8 @@ def test_shipped_cases_are_package_data():
     assert cases.names()
 
 
-def test_unknown_case_is_refused():
-    with pytest.raises(ConfigError, match="there is no case"):
+def test_unknown_case_is_refused(messages):
+    with messages.raised(ConfigError):
         cases.load(["no_such_case"])
 
 

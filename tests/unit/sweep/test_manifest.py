@@ -60,43 +60,43 @@ def test_equal_configuration_from_other_source_is_accepted(config, sweep):
 
 
 @pytest.mark.parametrize(
-    ("plan", "words"),
+    ("plan", "keys"),
     [
-        (of("problem.n=50", overrides=["physics.C=0.3"]), "physics.C = 0.15 there, 0.3 now"),
-        (of("problem.n=90", overrides=["physics.C=0.3"]), "physics.C = 0.15 there, 0.3 now"),
-        (of("physics.alpha=1.0"), "over problem.n, not over physics.alpha"),
+        (of("problem.n=50", overrides=["physics.C=0.3"]), ["physics.C"]),
+        (of("problem.n=90", overrides=["physics.C=0.3"]), ["physics.C"]),
+        (of("physics.alpha=1.0"), ["problem.n", "physics.alpha"]),
     ],
 )
-def test_other_sweep_in_directory_is_refused(plan, words, config, sweep):
+def test_other_sweep_in_directory_is_refused(messages, plan, keys, config, sweep):
     sweep.prepare(config, of("problem.n=50,60"))
     before = files(sweep.path)
-    with pytest.raises(ConfigError, match=f"(?s){words}.*Try: another directory"):
+    with messages.raised(ConfigError, *keys, "Try: "):
         sweep.prepare(config, plan)
     assert files(sweep.path) == before
 
 
-def test_changed_configuration_file_is_refused(config, sweep):
+def test_changed_configuration_file_is_refused(messages, config, sweep):
     sweep.prepare(config, of("problem.n=50"))
     config.write_text(TUBE + "[physics]\nbalsara = false\n")
-    with pytest.raises(ConfigError, match=r"physics\.balsara = True there, False now"):
+    with messages.raised(ConfigError, "physics.balsara"):
         sweep.prepare(config, of("problem.n=50"))
 
 
-def test_other_run_in_place_of_point_is_refused(config, sweep):
+def test_other_run_in_place_of_point_is_refused(messages, config, sweep):
     sweep.prepare(config, of("problem.n=50"))
     run = RunDirectory.create(sweep.path / "problem.n=50")
     other = configuration.load(config, ["problem.n=50", "time.end=0.3"])
     run.write_config(other.to_toml())
     run.write_summary({"status": "done"})
-    with pytest.raises(ConfigError, match=r"time\.end = 0.3 there, 0.2 now"):
+    with messages.raised(ConfigError, "time.end"):
         sweep.prepare(config, of("problem.n=50"))
 
 
-def test_directory_of_other_files_is_refused(config, tmp_path):
+def test_directory_of_other_files_is_refused(messages, config, tmp_path):
     (tmp_path / "mine").mkdir()
     (tmp_path / "mine" / "letter.txt").touch()
     for path in (tmp_path / "mine", config):
-        with pytest.raises(FileError, match="not the directory of a sweep"):
+        with messages.raised(FileError):
             SweepDirectory(path).prepare(config, of("problem.n=50"))
 
 
@@ -110,10 +110,10 @@ def test_invalid_point_creates_no_directory(config, sweep):
     "", "points = 1", "[[", 'set = "x"\n[vary]\n[points]', "set = []\n[vary]\nx = 1\n[points]",
     "set = []\n[vary]\n[points]\na = [1]", "a = " + "[" * 5000,
 ])  # fmt: skip
-def test_invalid_manifest_is_refused(text, config, sweep):
+def test_invalid_manifest_is_refused(messages, text, config, sweep):
     sweep.prepare(config, of("problem.n=50"))
     sweep.manifest.write_text(text)
-    with pytest.raises(FileError, match="is not the manifest of a sweep"):
+    with messages.raised(FileError):
         sweep.prepare(config, of("problem.n=50"))
 
 
@@ -135,11 +135,11 @@ def test_reason_not_text_is_shown_as_far_as_possible(config, sweep):
     assert standings[0].reason == found[names[0]]
 
 
-def test_pipe_in_sweep_directory_is_not_waited_for(config, sweep):
+def test_pipe_in_sweep_directory_is_not_waited_for(messages, config, sweep):
     sweep.prepare(config, of("problem.n=50"))
     sweep.base.unlink()
     os.mkfifo(sweep.base)
-    with pytest.raises(FileError, match=r"base.toml is not a regular file.\nTry: "):
+    with messages.raised(FileError, "base.toml"):
         sweep.prepare(config, of("problem.n=50"))
 
 
@@ -167,20 +167,20 @@ def test_sweep_killed_while_preparing_can_be_run_again(config, sweep, has_base):
 
 
 @pytest.mark.parametrize("there", ["logs/notes.txt", "notes.txt", "base.toml"])
-def test_directory_with_foreign_files_after_kill_is_refused(config, sweep, there):
+def test_directory_with_foreign_files_after_kill_is_refused(messages, config, sweep, there):
     sweep.logs.mkdir(parents=True)
     (sweep.path / there).write_text("[problem]\n")
     before = files(sweep.path)
-    with pytest.raises(FileError, match="not the directory of a sweep"):
+    with messages.raised(FileError):
         sweep.prepare(config, of("problem.n=40,50"))
     assert files(sweep.path) == before
 
 
-def test_logs_directory_link_is_refused(config, sweep, tmp_path):
+def test_logs_directory_link_is_refused(messages, config, sweep, tmp_path):
     sweep.prepare(config, of("problem.n=40,50"))
     sweep.logs.rename(tmp_path / "elsewhere")
     sweep.logs.symlink_to(tmp_path / "elsewhere")
-    with pytest.raises(FileError, match="logs is a symbolic link"):
+    with messages.raised(FileError):
         sweep.prepare(config, of("problem.n=40,50"))
 
 

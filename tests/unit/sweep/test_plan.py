@@ -63,8 +63,8 @@ def test_range_includes_last_value_within_rounding(text, values):
      "1e400:1e400:x2", "1:1e400:+1", "1:2:+1e400", "1e-400:1:x10", "1:1e12:+1", "1:2:x1.0000001",
      "1:2:x1.00000000000000000001", "1:" + "9" * 400 + ":x10", "1:10001:+1"],
 )  # fmt: skip
-def test_endless_or_empty_range_is_refused(text):
-    with pytest.raises(ConfigError, match=re.escape(text)):
+def test_endless_or_empty_range_is_refused(messages, text):
+    with messages.raised(ConfigError, text):
         expand(text)
 
 
@@ -94,22 +94,23 @@ def test_point_names_are_safe_short_and_unique():
 
 
 @pytest.mark.parametrize(
-    ("varies", "words"),
+    "varies",
     [
-        (["problem.n"], "expected TABLE.KEY=VALUE"),
-        (["n=1,2"], "expected TABLE.KEY=VALUE"),
-        (["problem.n="], "a value is empty"),
-        (["problem.n=1,,2"], "a value is empty"),
-        (["problem.n=1,2,1"], "1 stands there twice"),
-        (["problem.n=100:400:x2,200"], "200 stands there twice"),
-        (["problem.n=1", "problem.n=2"], "problem.n is varied already"),
-        (["problem.n=1", "problem . n=2"], "problem.n is varied already"),
-        (["problem.n=1:9000:+1", "physics.C=1:9000:+1"], "81,000,000 points"),
-        (["problem. =1"], "expected TABLE.KEY=VALUE"),
+        ["problem.n"],
+        ["n=1,2"],
+        ["problem.n="],
+        ["problem.n=1,,2"],
+        ["problem.n=1,2,1"],
+        ["problem.n=100:400:x2,200"],
+        ["problem.n=1", "problem.n=2"],
+        ["problem.n=1", "problem . n=2"],
+        ["problem.n=1:9000:+1", "physics.C=1:9000:+1"],
+        ["problem. =1"],
     ],
+    ids=" ".join,
 )
-def test_vary_unsuitable_key_is_refused(varies, words):
-    with pytest.raises(ConfigError, match=re.escape(words)):
+def test_vary_unsuitable_key_is_refused(messages, varies):
+    with messages.raised(ConfigError, "--vary"):
         Plan.of(varies)
 
 
@@ -132,26 +133,26 @@ def test_each_error_reported_once_in_user_terms(tmp_path):
     assert starts == {"--set physics.C=-2", "--vary problem.n=x", "--vary physics.alpha=-1.0"}
 
 
-def test_error_of_combination_names_point(tmp_path):
+def test_error_of_combination_names_point(messages, tmp_path):
     (tmp_path / "tube.toml").write_text(TUBE)
     plan = Plan.of(["problem.dimension=1,2", "problem.lattice=cubic,hexagonal"])
-    with pytest.raises(ConfigError, match=r"dimension=1,problem\.lattice=hexagonal|--vary"):
+    with messages.raised(ConfigError, "problem.lattice"):
         plan.resolved(tmp_path / "tube.toml")
 
 
 @pytest.mark.parametrize("override", ["physics.alpha=1.0", "physics . alpha.min=0.1"])
-def test_vary_key_also_set_is_refused(override):
-    with pytest.raises(ConfigError, match=r"physics\.alpha is varied"):
+def test_vary_key_also_set_is_refused(messages, override):
+    with messages.raised(ConfigError, "physics.alpha"):
         Plan.of(["physics.alpha=0.5,1.0"], [override])
 
 
-def test_two_points_with_equal_configuration_are_refused(tmp_path):
+def test_two_points_with_equal_configuration_are_refused(messages, tmp_path):
     (tmp_path / "tube.toml").write_text(TUBE)
-    with pytest.raises(ConfigError, match=r"alpha=0\.5 and physics\.alpha=0\.50 are the same"):
+    with messages.raised(ConfigError, "physics.alpha"):
         Plan.of(["physics.alpha=0.5,0.50"]).resolved(tmp_path / "tube.toml")
 
 
-def test_vary_text_not_utf8_is_refused(tmp_path):
+def test_vary_text_not_utf8_is_refused(messages, tmp_path):
     (tmp_path / "tube.toml").write_text(TUBE)
-    with pytest.raises(ConfigError, match="expected UTF-8 text"):
+    with messages.raised(ConfigError):
         Plan.of(["physics.kernel=wendland_c2,\udcff"]).resolved(tmp_path / "tube.toml")
