@@ -38,27 +38,27 @@ def lines(**changed):
     return in_words(DONE | changed).splitlines()
 
 
-def test_summary_text_names_every_figure():
+def test_summary_text_names_every_figure(messages):
     first, errors, figure, kept, cost = lines()
-    assert first == "uniform: 100 particles to t = 0.25 in 20 steps (done)."
-    assert "exact solution" in errors
-    assert errors.endswith("x > 0): density 0.01 (2.5 %), internal energy 0.02.")
-    assert figure == "  peak density: 4.5"
-    assert "energy to 2e-05;" in kept
-    assert "momentum to 3e-15;" in kept
-    assert kept.endswith("0.9877 of the volume.")
-    assert "2 s, 3 CPU s on 2 thread" in cost
-    assert "1.5 s compiling; 1,234,567 particle updates" in cost
+    numbers = {
+        first: ["100", "0.25", "20", "done"],
+        errors: ["x > 0", "density 0.01", "2.5 %", "internal energy 0.02"],
+        figure: ["peak density", "4.5"],
+        kept: ["2e-05", "3e-15", "0.9877"],
+        cost: ["2 s", "3 CPU s", "1.5 s", "1,234,567"],
+    }
+    for line, expected in numbers.items():
+        assert all(number in line for number in expected), line
+    messages.check("\n".join(lines()))
 
 
-def test_summary_text_names_injected_and_added_energy():
+def test_summary_text_names_injected_and_added_energy(messages):
     def kept(**changed):
         return lines(conservation=KEPT | changed)[3]
 
-    assert "(1.5e-05 of it to keep internal energies positive)" in kept(energy_injected=1.5e-5)
-    assert "positive" not in kept()
-    assert "momentum is not conserved" in kept(momentum_change=None)
-    assert "m/rho" not in kept(volume_ratio=None)
+    assert "1.5e-05" in kept(energy_injected=1.5e-5)
+    for changed in ("energy_injected", "momentum_change", "volume_ratio"):
+        messages.check(kept(**{changed: 1.5e-5 if changed == "energy_injected" else None}))
 
 
 @pytest.mark.parametrize(("count", "words"), [(1, "1 warning)"), (2, "2 warnings)")])
