@@ -8,7 +8,6 @@ of --repeats runs. CPU seconds are user + system over all threads. Prints Markdo
 """
 
 import argparse
-import json
 import os
 import platform
 import resource
@@ -17,6 +16,8 @@ import subprocess
 import sys
 import tempfile
 from pathlib import Path
+
+from sph.output.run_directory import RunDirectory
 
 UNIFORM = """
 [problem]
@@ -85,8 +86,8 @@ def run(text: str, threads=1, cache: Path | None = None) -> dict:
         )
         wall = os.times().elapsed - begin
         after = resource.getrusage(resource.RUSAGE_CHILDREN)
-        summary = json.loads(Path(folder, "run", "summary.json").read_text())
-    cost = summary["cost"]["session"] | {"particles": summary["particles"]}
+        summary = RunDirectory(Path(folder, "run")).whole_summary()
+    cost = {**summary["cost"]["session"], "particles": summary["particles"]}
     cost["process_cpu"] = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
     cost["process_wall"] = wall
     return cost

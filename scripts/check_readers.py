@@ -15,8 +15,10 @@ from pathlib import Path
 import numpy as np
 
 from sph import config, kernels
+from sph.formulations import gas
 from sph.output import checkpoint
-from sph.particles import Particles
+from sph.parts.viscosity import ALPHA, ALPHA_RATE
+from sph.state import State
 
 # Lattice cells along each axis, and the boundary, by dimension. In 1-D the gas is a line of the
 # smoothing length's width, so few cells: it must be wider than a pixel of the slice.
@@ -55,13 +57,14 @@ def made_up(dimension: int) -> checkpoint.Checkpoint:
     density = 1.0 + (position[0] - position[0].min())
     volume = np.prod(domain[:, 1] - domain[:, 0]) / number
     random = np.random.default_rng(dimension)
-    particles = Particles.at_start(
+    particles = State.at_start(
+        (*gas.FIELDS, ALPHA, ALPHA_RATE),
         position=position,
         velocity=random.normal(size=position.shape),
         mass=density * volume,
         internal_energy=1.0 + random.random(number),
-        alpha=0.1,
     )
+    particles.alpha[:] = 0.1
     particles.density[:] = density
     particles.omega[:] = 1.0
     state = checkpoint.Checkpoint(
@@ -79,8 +82,7 @@ def made_up(dimension: int) -> checkpoint.Checkpoint:
     ratio = kernels.support_ratio(kernel, dimension)
     particles.support[:] = ratio * 1.6 * ((domain[:, 1] - domain[:, 0]) / cells).max()
     order = random.permutation(number)
-    shuffled = {name: array[..., order] for name, array in particles.arrays().items()}
-    state.particles = Particles(**shuffled)
+    state.particles = particles.subset(order)
     return state
 
 

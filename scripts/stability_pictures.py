@@ -15,7 +15,6 @@ from pathlib import Path
 
 import numpy as np
 from matplotlib.ticker import LogLocator
-from PIL import Image
 from stability import PROBLEMS, ROOT, SCHEMES
 
 from sph import config as configuration
@@ -60,7 +59,7 @@ def searches(directory: Path, key: str, target: Path) -> None:
         panel.set_xlabel(SYMBOLS[key])
     handles, labels = panels[0, 0].get_legend_handles_labels()
     picture.legend(handles, labels, loc="outside lower center", ncols=len(handles))
-    _save(picture, target)
+    style.save_png(picture, target, colours=96, dpi=100)
 
 
 def _search(panel, found: dict, scheme: str, colour: str) -> None:
@@ -99,8 +98,8 @@ def gallery(directory: Path, target: Path) -> None:
         for run, colour, size in zip(runs, ("0.6", style.PALETTE[1]), (9, 3), strict=True):
             state = checkpoint.read(run.checkpoints()[last])
             _density(panel, state, AXES.get(problem), colour, size)
-        summary = json.loads(runs[1].summary.read_text())
-        drift = float(summary["conservation"]["energy_drift_max"])
+        summary = runs[1].whole_summary()
+        drift = summary["conservation"]["energy_drift_max"]
         ended = "" if summary["status"] == "done" else ", stopped"
         panel.set_title(
             f"{problem.replace('_', ' ')}, C = {FAR * stable:.2g}\n"
@@ -108,7 +107,7 @@ def gallery(directory: Path, target: Path) -> None:
             fontsize=9,
         )
         panel.tick_params(labelsize=8)
-    _save(picture, target)
+    style.save_png(picture, target, colours=96, dpi=100)
 
 
 def _run(home: Path, problem: str, courant: float) -> RunDirectory:
@@ -162,13 +161,13 @@ def sod_tube(directory: Path, key: str, target: Path) -> None:
         panel.set_xlabel("$x$")
     # what has blown up goes off the panel rather than hide the rest
     panels[0, 0].set_ylim(0.0, 1.5)
-    _save(picture, target)
+    style.save_png(picture, target, colours=96, dpi=100)
 
 
 def _profile(panel, directory: Path) -> None:
     """The last density of a run, over the exact one; in the title its energy drift, or its end."""
     run = RunDirectory(directory)
-    summary = json.loads(run.summary.read_text())
+    summary = run.whole_summary()
     state = checkpoint.read(run.checkpoints()[-1])
     x = state.particles.position[0]
     order = np.argsort(x)
@@ -176,17 +175,9 @@ def _profile(panel, directory: Path) -> None:
     exact = problem.exact(eos, state.time, state.particles.position)["density"]
     panel.plot(x[order], exact[order], color="0.6")
     panel.plot(x, state.particles.density, ".", ms=2.5, color=style.PALETTE[0])
-    drift = float(summary["conservation"]["energy_drift_max"])
+    drift = summary["conservation"]["energy_drift_max"]
     ended = "" if summary["status"] == "done" else f", stopped at t = {summary['time']:.2g}"
     panel.set_title(f", drift {drift:.1g}{ended}")
-
-
-def _save(picture, target: Path) -> None:
-    """In few colours, which such pictures need: a tenth of the bytes in the repository."""
-    picture.savefig(target, dpi=100)
-    with Image.open(target) as image:
-        few = image.convert("RGB").quantize(96, dither=Image.Dither.NONE)
-    few.save(target, optimize=True)
 
 
 def main() -> None:

@@ -13,20 +13,20 @@ from sph.problems.base import Problem
 TARGET = Path(__file__).parents[1] / "docs" / "configuration.md"
 HEAD = """# Configuration
 
-Every key with its meaning, bounds and default, as `sph new PROBLEM` prints it. Written by
-`python scripts/write_configuration.py` from the definitions in the sources, not by hand.
+Every key with its meaning, bounds and default, as `sph new PROBLEM` prints it. The command
+`python scripts/write_configuration.py` writes this page from the definitions in the sources.
 
-A configuration is strict: an unknown key, a wrong type or a value out of bounds is an error that
-names file, line and the nearest valid name, all of them at once. A key that is left out takes its
-default; a problem may have defaults of its own for keys of the other tables. `--set a.b=VALUE`
-sets a key from the command line.
+A configuration is checked strictly: an unknown key, a wrong type and a value out of bounds are
+errors. The messages give file, line and the nearest valid name, and `sph` reports all errors
+together. A key that is not given has its default. A problem may have its own defaults for keys of
+other tables. `--set TABLE.KEY=VALUE` sets a key from the command line.
 
-`sph restart --set` may change a key by its class:
+The class of a key says whether `sph restart --set` may change the key:
 
 {classes}
 
-{tables}. Keys of the other tables each say their class. The lineage is in the checkpoints
-written after the restart, and in `summary.json`.
+{tables}. In the other tables each key states its class. The lineage is stored in the checkpoints
+that the restarted run writes, and in `summary.json`.
 """
 
 
@@ -48,10 +48,10 @@ def _head() -> str:
     """HEAD with the classes of keys in a restart, and the tables whose keys are all of one."""
     classes = "\n".join(f"- **{name}**: {what};" for name, what in restarts.CLASSES.items())
     tables = {"problem": Problem, **SECTIONS}
-    alike = [f"[{name}] {table.restart}" for name, table in tables.items() if table.restart]
+    alike = [f"[{name}] is {table.restart}" for name, table in tables.items() if table.restart]
     return HEAD.format(
         classes=classes.removesuffix(";") + ".",
-        tables=f"All keys of these tables have one class: {', '.join(alike)}",
+        tables=f"The class of all keys of {', of '.join(alike)}",
     )
 
 

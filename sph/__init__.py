@@ -1,4 +1,4 @@
-"""Smoothed particle hydrodynamics from the command line."""
+"""Smoothed-particle hydrodynamics (SPH) of compressible gas."""
 
 from sph.version import __version__
 

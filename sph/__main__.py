@@ -1,4 +1,4 @@
-"""The program from its first moment: signals are heeded before any import that takes time."""
+"""Entry point of `sph` and `python -m sph`: installs signal handlers before the slow imports."""
 
 import sys
 from importlib.util import find_spec
@@ -7,11 +7,11 @@ from sph import stop_signals
 
 
 def main():
-    """Run the command line. A signal that no command takes care of ends it in one line."""
+    """Run the command line. SIGINT and SIGTERM end the program with one line, without traceback."""
     stop_signals.end_at_once()
     if find_spec("fcntl") is None or find_spec("resource") is None:
         print(
-            "sph: this system is not POSIX: sph runs on Linux and macOS.\n"
+            "sph: this operating system is not supported: expected Linux or macOS.\n"
             "Try: on Windows, the Windows Subsystem for Linux.",
             file=sys.stderr,
         )

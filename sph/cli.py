@@ -1,12 +1,12 @@
-"""The command line."""
+"""The command `sph` and its subcommands on single runs; `cli_studies` holds those on many runs."""
 
 import signal
 import sys
 
-if __name__ == "__main__":  # python -m sph.cli: as `sph`, before the imports below take time
-    from sph.__main__ import main
+if __name__ == "__main__":  # python -m sph.cli: install signal handlers before the slow imports
+    from sph.__main__ import main as program
 
-    sys.exit(main())
+    sys.exit(program())
 
 from pathlib import Path
 
@@ -20,18 +20,21 @@ from sph.version import __version__
 
 OVERRIDES = click.option(
     "--set", "overrides", multiple=True, metavar="KEY=VALUE",
-    help="Set a key of the configuration, e.g. --set physics.alpha=2.0; may be repeated.",
+    help="Set a key of the configuration, e.g. --set physics.alpha=2.0. May be repeated.",
 )  # fmt: skip
 THREADS = click.option(
-    "--threads", type=click.IntRange(min=1), metavar="N", help="Threads: run.threads for this run."
+    "--threads",
+    type=click.IntRange(min=1),
+    metavar="N",
+    help="Number of threads. Overrides the key run.threads.",
 )
 STRICT = click.option(
-    "--strict", is_flag=True, help="Exit with 3 where the run ends with a warning."
+    "--strict", is_flag=True, help="Exit with code 3 if the finished run has warnings."
 )
 
 
 class Program(click.Group):
-    """Shows the program's own errors as their message and exits with their code."""
+    """A command group that prints an SphError as its message and exits with its exit code."""
 
     def main(self, *arguments, **settings):
         standard_streams.secure()
@@ -43,14 +46,14 @@ class Program(click.Group):
         except SphError as error:
             click.echo(f"sph: {error}", err=True)
             sys.exit(error.exit_code)
-        except OSError as error:  # such as a name that is too long, wherever it was looked at
+        except OSError as error:  # such as a file name that is too long
             where = "" if error.filename is None else f"{error.filename}: "
             click.echo(f"sph: {where}{error.strerror or error}.", err=True)
             sys.exit(FileError.exit_code)
         except MemoryError as error:
             click.echo(f"sph: out of memory: {error}\nTry: a smaller problem.n.", err=True)
             sys.exit(ConfigError.exit_code)
-        except KeyboardInterrupt:  # the second of two, where the first asks for a checkpoint
+        except KeyboardInterrupt:  # a second Ctrl-C; the first asks a run for a checkpoint
             click.echo("sph: ended by Ctrl-C", err=True)
             sys.exit(128 + signal.SIGINT)
 
@@ -58,20 +61,38 @@ class Program(click.Group):
 @click.group(cls=Program, context_settings={"help_option_names": ["-h", "--help"]})
 @click.version_option(__version__, prog_name="sph")
 def main():
-    """Smoothed particle hydrodynamics: fast, checked, and honest about its error."""
+    """Smoothed-particle hydrodynamics (SPH) of compressible gas.
+
+    \b
+    First steps:
+      sph list                           lists problems, kernels and schemes
+      sph new shock_tube -o tube.toml    writes a commented configuration
+      sph run tube.toml                  runs it, in the directory runs/tube
+      sph plot runs/tube                 draws profiles and the history
+
+    \b
+    Exit codes: 0 done, 2 wrong configuration or command line, 3 numerical
+    failure, 4 input or output error, 75 stopped early with a checkpoint.
+    """
 
 
 @main.command()
 @click.argument("config", type=click.Path(path_type=Path))
 @OVERRIDES
 @click.option("-o", "directory", type=click.Path(path_type=Path), metavar="DIR",
-              help="The run directory; runs/<name of CONFIG> if not given.")  # fmt: skip
+              help="Run directory, for all output. Default: runs/<name of CONFIG>.")  # fmt: skip
 @THREADS
-@click.option("--dry-run", is_flag=True, help="Check CONFIG and say what the run would be.")
+@click.option("--dry-run", is_flag=True,
+              help="Check CONFIG and describe the run, without running.")  # fmt: skip
 @click.option("--force", is_flag=True, help="Replace an earlier run in DIR.")
 @STRICT
 def run(config, overrides, directory, threads, dry_run, force, strict):
-    """Run CONFIG, a TOML file, from its initial state to its end."""
+    """Run the configuration file CONFIG (TOML).
+
+    The run directory holds checkpoints, the history of all time steps, and
+    summary.json, which gives conservation errors and, if an exact solution
+    exists, the errors of the final state.
+    """
     from sph import config as configuration
 
     resolved = configuration.load(config, _with_threads(overrides, threads))
@@ -88,7 +109,7 @@ def run(config, overrides, directory, threads, dry_run, force, strict):
     from sph.output.run_directory import RunDirectory
 
     target = RunDirectory.create(where, force)
-    _tell(runner.run(resolved, target, progress.suited()), target, strict)
+    _print_result(runner.run(resolved, target, progress.suited()), target, strict)
 
 
 @main.command()
@@ -96,26 +117,32 @@ def run(config, overrides, directory, threads, dry_run, force, strict):
 @OVERRIDES
 @THREADS
 @click.option("-o", "directory", type=click.Path(path_type=Path), metavar="DIR",
-              help="Go on in a new run directory; in the same one if not given.")  # fmt: skip
+              help="New run directory to continue in. Default: the run's own.")  # fmt: skip
 @STRICT
 def restart(source, overrides, threads, directory, strict):
-    """Go on from a run's last good checkpoint, or from that very checkpoint.
+    """Continue a run from a checkpoint.
 
-    In the same directory later checkpoints are replaced.
+    RUN_OR_CHECKPOINT is a checkpoint file, or a run directory, of which the
+    last valid checkpoint is used. Without -o, the run's later checkpoints are
+    replaced. docs/configuration.md says which keys --set may change in a
+    restart.
     """
     from sph import progress, restarting
 
     overrides = _with_threads(overrides, threads)
-    _tell(*restarting.restart(source, overrides, directory, progress.suited()), strict)
+    _print_result(*restarting.restart(source, overrides, directory, progress.suited()), strict)
 
 
 @main.command()
 @click.argument("sources", metavar="RUN_OR_CHECKPOINT...", nargs=-1, required=True,
                 type=click.Path(path_type=Path))  # fmt: skip
 @click.option("-o", "target", type=click.Path(path_type=Path), metavar="FILE",
-              help="The file of one picture; else they go to figures/ of the run.")  # fmt: skip
+              help="Write one picture to FILE. Default: several, in figures/.")  # fmt: skip
 def plot(sources, target):
-    """Draw runs or checkpoints: profiles, maps, slices and the history."""
+    """Draw profiles, maps, slices and the history of runs.
+
+    RUN_OR_CHECKPOINT is a run directory or a checkpoint file.
+    """
     from sph.analysis import figures
 
     for path in figures.draw(sources, target):
@@ -125,9 +152,13 @@ def plot(sources, target):
 @main.command()
 @click.argument("problem")
 @click.option("-o", "target", type=click.Path(path_type=Path), metavar="FILE",
-              help="Write to FILE, which must not be there yet.")  # fmt: skip
+              help="Write to FILE, which must not exist. Default: standard output.")  # fmt: skip
 def new(problem, target):
-    """Print a configuration for PROBLEM with every key, its meaning, bounds and default."""
+    """Print a commented configuration for PROBLEM.
+
+    It gives the meaning, bounds and default of each key. `sph list` names the
+    problems.
+    """
     from sph import config as configuration
 
     text = configuration.template(problem)
@@ -142,35 +173,55 @@ def new(problem, target):
 
 @main.command("list")
 def list_choices():
-    """Name the problems, kernels, schemes, the other choices and the stress cases there are."""
+    """List problems, kernels, schemes, other models and stress cases."""
     from sph import registry
     from sph.stress.case import load as stress_cases
 
-    for package in (
-        "problems", "kernels", "schemes", "eos", "viscosity.switches", "conductivity", "external",
-        "heating",
-    ):  # fmt: skip
-        click.echo(f"{package}:")
-        for name in registry.names(f"sph.{package}"):
-            module = registry.load(f"sph.{package}", name)
+    for title, package in _choices().items():
+        click.echo(f"{title}:")
+        folders = package in FOLDERS
+        for name in registry.names(package, folders):
+            module = registry.load(package, name, folders)
             click.echo(f"  {name:24s} {docstring(module).strip().splitlines()[0]}")
     click.echo("stress cases:")
     for case in stress_cases():
         click.echo(f"  {case.name:24s} {case.title}")
 
 
-def _tell(result, target, strict):
-    """The closing words on stdout; that there are warnings also on stderr, where logs are read."""
+# Whose choices are folders, not files.
+FOLDERS = ("sph.formulations", "sph.parts")
+
+
+def _choices() -> dict[str, str]:
+    """Return the folders whose files or folders a configuration can name, by title."""
+    from sph import registry
+    from sph.config import physics
+
+    found = {
+        "problems": "sph.problems", "kernels": "sph.kernels", "equations of state": "sph.eos",
+        **{package.removeprefix("sph."): package for package in FOLDERS},
+    }  # fmt: skip
+    for name in registry.names("sph.formulations", folders=True):
+        for kind in physics.table(name).kinds:
+            found |= {f"physics.{key.name}": key.models for key in kind.keys if key.models}
+    return found
+
+
+def _print_result(result, target, strict):
+    """Print the summary of a finished run to stdout, and the kinds of its warnings to stderr.
+
+    Raises NumericalError if `strict` and there are warnings.
+    """
     from sph import warnings
     from sph.analysis import summary
 
     click.echo(summary.in_words(result))
     click.echo(f"Results: {target.path} (`sph plot {quoted(target.path)}` draws them).")
     if kinds := warnings.kinds(result):
-        said = f"{target.path} ended with warnings: {', '.join(kinds)} (see docs/warnings.md)"
+        text = f"{target.path} ended with warnings: {', '.join(kinds)} (see docs/warnings.md)."
         if strict:
-            raise NumericalError(f"{said}.")
-        click.echo(f"sph: {said}.", err=True)
+            raise NumericalError(text)
+        click.echo(f"sph: {text}", err=True)
 
 
 def _with_threads(overrides, threads):

@@ -1,4 +1,4 @@
-"""The commands over many runs: `sph sweep`, `sph report`, `sph stress` and `sph stability`."""
+"""The commands on many runs: `sph sweep`, `sph report`, `sph stress` and `sph stability`."""
 
 from pathlib import Path
 
@@ -11,24 +11,28 @@ from sph.shell_words import quoted
 @click.command()
 @click.argument("config", type=click.Path(path_type=Path))
 @click.option("--vary", "varies", multiple=True, required=True, metavar="KEY=A,B,…",
-              help="Values of a key, e.g. physics.alpha=0.5,1.0 or problem.n=100:1600:x2 or "
-              "physics.C=0.05:0.3:+0.05; may be repeated.")  # fmt: skip
+              help="Values of a key: a list, as in physics.alpha=0.5,1.0; or first, last and "
+              "factor, as in problem.n=100:1600:x2; or first, last and increment, as in "
+              "physics.C=0.05:0.3:+0.05. May be repeated.")  # fmt: skip
 @click.option("--set", "overrides", multiple=True, metavar="KEY=VALUE",
-              help="Set a key for all points; may be repeated.")  # fmt: skip
+              help="Set a key of the configuration for all points. May be repeated.")  # fmt: skip
 @click.option("-o", "directory", type=click.Path(path_type=Path), metavar="DIR",
-              help="Where the runs go; runs/<name of CONFIG>-sweep if not given.")  # fmt: skip
+              help="Directory of the sweep. Default: runs/<name of CONFIG>-sweep.")  # fmt: skip
 @click.option("--jobs", type=click.IntRange(min=1), metavar="N",
-              help="Points at once; as many as there are processors if not given.")  # fmt: skip
+              help="Number of points to run at once. Default: number of processors.")  # fmt: skip
 @click.option("--scheduler", metavar="ADDRESS",
-              help="Run on a Dask scheduler, e.g. tcp://127.0.0.1:8786.")  # fmt: skip
+              help="Run on this Dask scheduler, e.g. tcp://127.0.0.1:8786.")  # fmt: skip
 @click.option("--slurm", multiple=True, metavar="KEY=VALUE",
-              help="Run as Slurm jobs, with this option of submitit, e.g. timeout_min=60 or "
-              "partition=short; may be repeated.")  # fmt: skip
-@click.option("--yes", "is_sure", is_flag=True, help="Run also more than 1000 points.")
+              help="Run as Slurm jobs with this option of the package submitit, e.g. "
+              "timeout_min=60 or partition=short. May be repeated.")  # fmt: skip
+@click.option("--yes", "is_sure", is_flag=True,
+              help="Allow more than 1000 points.")  # fmt: skip
 def sweep(config, varies, overrides, directory, jobs, scheduler, slurm, is_sure):
-    """Run CONFIG at every combination of the values, each a run directory in DIR.
+    """Run CONFIG for all combinations of the values in --vary.
 
-    Run again, it does only what is missing or failed, and goes on with what was interrupted.
+    Each combination is a point of the sweep and has a run directory in DIR.
+    The same command, repeated, skips finished points, continues interrupted
+    ones from their last checkpoint and runs failed ones again.
     """
     from sph.sweep import command
 
@@ -41,21 +45,27 @@ def sweep(config, varies, overrides, directory, jobs, scheduler, slurm, is_sure)
 @click.argument("sources", metavar="DIR...", nargs=-1, required=True,
                 type=click.Path(path_type=Path))  # fmt: skip
 @click.option("--field", default="density", show_default=True, metavar="NAME",
-              help="A field, or a figure of the summary such as report.NAME.")  # fmt: skip
-@click.option("--norm", type=click.Choice(["L1", "L2", "Linf"]), default="L1", show_default=True)
+              help="Quantity to compare: a field such as density or velocity, or a number in "
+              "summary.json such as report.NAME.")  # fmt: skip
+@click.option("--norm", type=click.Choice(["L1", "L2", "Linf"]), default="L1", show_default=True,
+              help="Norm of a field's error.")  # fmt: skip
 @click.option("--x", "cost", type=click.Choice(["cpu", "wall", "updates", "n"]), default="cpu",
-              show_default=True, help="What the error is drawn and weighed against.")  # fmt: skip
+              show_default=True, help="Cost that the error is plotted against: CPU seconds, wall-"
+              "clock seconds, particle updates, or the number of particles.")  # fmt: skip
 @click.option("--by", multiple=True, metavar="KEY",
-              help="Tell lines apart by this key; all keys that vary if not given.")  # fmt: skip
+              help="Draw each value of KEY in its own colour. May be repeated. Default: all keys "
+              "that vary, except problem.n.")  # fmt: skip
 @click.option("--reference", type=click.Path(path_type=Path), metavar="DIR",
-              help="For runs made already: take errors against this finer run, in place "
-              "of those in their summaries.")  # fmt: skip
+              help="Compute errors against this run of higher resolution. Default: the errors in "
+              "each summary.json.")  # fmt: skip
 @click.option("-o", "directory", type=click.Path(path_type=Path), metavar="DIR",
-              help="Where all goes; report/ in the first DIR if not given.")  # fmt: skip
+              help="Directory of the report. Default: report/ in the first DIR.")  # fmt: skip
 def report(sources, field, norm, cost, by, reference, directory):
-    """Compare runs, or the runs in a directory: error against what it cost.
+    """Compare the error of several runs with their cost.
 
-    Says which settings are the fastest at their error, and by how much the others are slower.
+    DIR is a run directory, or a directory that contains some, such as that of a
+    sweep. The report says which settings reach a given error fastest, and how
+    much slower the others are.
     """
     from sph.analysis import report as reports
 
@@ -69,17 +79,19 @@ def report(sources, field, norm, cost, by, reference, directory):
 
 @click.command()
 @click.option("--only", multiple=True, metavar="NAME",
-              help="Run this case alone, or all that match a pattern such as 'noh_*'; may be "
-              "repeated. `sph list` names them.")  # fmt: skip
+              help="Run only this case, or the cases that match a pattern such as 'noh_*'. "
+              "`sph list` names the cases. May be repeated.")  # fmt: skip
 @click.option("-o", "directory", type=click.Path(path_type=Path), metavar="DIR",
               default=Path("runs/stress"), show_default=True,
-              help="Where the runs go.")  # fmt: skip
+              help="Directory of the runs.")  # fmt: skip
 @click.option("--jobs", type=click.IntRange(min=1), metavar="N",
-              help="Runs at once; as many as there are processors if not given.")  # fmt: skip
+              help="Number of runs at once. Default: number of processors.")  # fmt: skip
 def stress(only, directory, jobs):
-    """Run the suite of hard cases and judge each by its limits; exits with 3 if one falls short.
+    """Run difficult test cases and check their results.
 
-    Settings that are to fail must be caught failing. Run again, it does only what is missing.
+    Some settings are expected failures: they pass if the run stops with an
+    error. The same command, repeated, runs only what is missing. Exits with
+    code 3 if a case does not pass.
     """
     from sph.stress import command, table
 
@@ -96,20 +108,22 @@ def stress(only, directory, jobs):
 @click.command()
 @click.argument("config", type=click.Path(path_type=Path))
 @click.option("--key", default="physics.C", show_default=True, metavar="physics.C|physics.eta",
-              help="The key whose stable range is looked for.")  # fmt: skip
+              help="Key whose stable range is searched.")  # fmt: skip
 @click.option("--set", "overrides", multiple=True, metavar="KEY=VALUE",
-              help="Set a key of the configuration; may be repeated.")  # fmt: skip
+              help="Set a key of the configuration. May be repeated.")  # fmt: skip
 @click.option("--limit", "limits", multiple=True, metavar="KEY=VALUE",
-              help="What a stable run keeps and how it is looked for: reference, error_growth, "
-              "deviation, negligible, resolution; may be repeated.")  # fmt: skip
+              help="Change the definition of a stable run or the accuracy of the search. Keys: "
+              "reference, error_growth, deviation, negligible, resolution; see "
+              "docs/stability.md. May be repeated.")  # fmt: skip
 @click.option("-o", "directory", type=click.Path(path_type=Path), metavar="DIR",
-              help="Where the runs go; runs/<name of CONFIG>-stability if not given.")  # fmt: skip
+              help="Directory of the runs. Default: runs/<name of CONFIG>-stability.")  # fmt: skip
 @click.option("--jobs", type=click.IntRange(min=1), metavar="N",
-              help="Runs at once; as many as there are processors if not given.")  # fmt: skip
+              help="Number of runs at once. Default: number of processors.")  # fmt: skip
 def stability(config, key, overrides, limits, directory, jobs):
-    """Find by bisection how far C or eta of CONFIG is from where runs stop being stable.
+    """Find by bisection the stable range of physics.C or physics.eta.
 
-    Run again, it does only what is missing. Exits with 3 if nothing that was tried is stable.
+    The same command, repeated, runs only what is missing. Exits with code 3 if
+    no value that was tried is stable.
     """
     from sph.stability import command, picture, table
 

@@ -1,10 +1,10 @@
-"""Compiled code on disk: one checked file for each function and signature.
+"""Cache of compiled code on disk: one file with a checksum for each function and signature.
 
-In place of Numba's cache, which does not see an edit to a function that is called, nor its own
-settings, nor another developer's directory, and which fails in every later process once one of its
-files is damaged or its directory cannot be written. Here the directory is named by all that decides
-the code (`sph.fingerprint`), an entry that is not what it should be is compiled anew, and without a
-directory that is safe to use code is compiled in every process.
+This replaces Numba's cache. Numba's does not notice an edit to a called function, a changed setting
+of Numba or another source directory, and it fails in all later processes once a file is damaged or
+its directory is not writable. Here the directory is named by everything that affects the code
+(`sph.fingerprint`), a damaged entry is compiled again, and if no directory is safe to use, code is
+compiled in every process.
 """
 
 import fcntl
@@ -28,23 +28,23 @@ from numba.core.serialize import dumps
 from sph import fingerprint
 from sph.version import __version__
 
-# Directories of other sources, versions, processors or settings that are kept, last used first.
+# Number of directories (of other sources, versions, processors or settings) that are kept.
 KEPT = 16
 NAME = re.compile(r"sph-\d[\w.+]*-[0-9a-f]{16}")
 DIGEST = hashlib.sha256().digest_size
 
 
 def install() -> None:
-    """Make Numba keep what is compiled with cache=True from now on here."""
-    directory()  # before the modules are imported that it is named by
-    dispatcher.FunctionCache = _of_function
+    """Make Numba use this cache for functions that are compiled with cache=True from now on."""
+    directory()  # before the modules are imported whose sources it is named by
+    dispatcher.FunctionCache = _of_function  # type: ignore[attr-defined]
 
 
 def place() -> Path | None:
-    """The directory that holds those of all versions, or None where the user has none.
+    """Return the parent of all cache directories, or None if the user has no cache directory.
 
-    NUMBA_CACHE_DIR if that is set, else the user's cache directory: $XDG_CACHE_HOME/sph or
-    ~/.cache/sph, on macOS ~/Library/Caches/sph.
+    This is NUMBA_CACHE_DIR if that is set, otherwise a subdirectory of the user's cache directory:
+    $XDG_CACHE_HOME/sph or ~/.cache/sph, on macOS ~/Library/Caches/sph.
     """
     if chosen := os.environ.get("NUMBA_CACHE_DIR"):
         return Path(chosen).absolute()
@@ -54,28 +54,29 @@ def place() -> Path | None:
 
 @functools.cache
 def directory() -> "Directory":
-    """The directory of this process's code."""
+    """Return the cache directory of this process."""
     where = place()
     return Directory(where and where / f"sph-{__version__}-{fingerprint.key()}")
 
 
 class Directory:
-    """A directory of entries, opened when one is first asked for.
+    """A cache directory, opened when an entry is first needed.
 
-    It is used only if nobody else can write to it: an entry is code. What it is, is asked of the
-    open directory, through which all files are then reached.
+    An entry is executable code, so the directory is used only if no other user can write to it.
+    Owner and permissions are read from the open descriptor, through which all files are accessed.
     """
 
     def __init__(self, path: Path | None):
         self.path = path
-        self.reason = ""  # why it cannot be used, or not be written to
-        self._told = False
+        self.reason = ""  # why the directory cannot be used or written
+        self._has_warned = False
 
     @functools.cached_property
     def descriptor(self) -> int | None:
-        """The open directory, held by a shared lock for as long as the process lives, or None."""
+        """Descriptor of the directory, under a shared lock until the process ends, or None."""
         if self.path is None or not fingerprint.facts()["sources of sph"]:
-            return self._refuse("there is none: no home directory, or no source files")
+            self._refuse("there is no home directory, or there are no source files of sph")
+            return None
         try:
             is_new = not self.path.is_dir()
             if is_new:
@@ -83,19 +84,25 @@ class Directory:
                 self.path.mkdir(0o700, exist_ok=True)
             opened = os.open(self.path, os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW)
         except OSError as error:
-            return self._refuse(error.strerror)
+            self._refuse(error.strerror)
+            return None
         if danger := _danger(os.fstat(opened)):
             os.close(opened)
-            return self._refuse(danger)
-        with suppress(OSError):  # a file system without locks, or without leave to write
+            self._refuse(danger)
+            return None
+        with suppress(OSError):  # a file system without locks, or read-only
             fcntl.flock(opened, fcntl.LOCK_SH | fcntl.LOCK_NB)
             os.utime(opened)
         if is_new:
             prune(self.path.parent)
         return opened
 
+    @property
+    def name(self) -> str:
+        return self.path.name if self.path else ""
+
     def read(self, name: str) -> bytes | None:
-        """The content of an entry, or None where there is none that is whole and ours."""
+        """Return the content of an entry, or None if it is missing, damaged or not the user's."""
         try:
             entry = os.open(name, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK,
                             dir_fd=self.descriptor)  # fmt: skip
@@ -109,7 +116,7 @@ class Directory:
         return content if hashlib.sha256(content).digest() == digest else None
 
     def write(self, name: str, content: bytes) -> None:
-        """Write an entry, all or nothing; where that fails the reason is told."""
+        """Write an entry atomically. If that fails, print a warning once."""
         unfinished = f"{name}.{uuid.uuid4().hex}"
         try:
             entry = os.open(unfinished, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600,
@@ -124,35 +131,35 @@ class Directory:
                 raise
         except OSError as error:
             self._refuse(error.strerror)
-            self.tell()
+            self.warn()
 
-    def tell(self) -> None:
-        """Say once why code that has been compiled cannot be kept."""
-        if not self._told:
-            self._told = True
+    def warn(self) -> None:
+        """Print once why compiled code cannot be cached."""
+        if not self._has_warned:
+            self._has_warned = True
             print(
-                f"sph: compiled code cannot be kept in {self.path or 'a cache directory'}: "
-                f"{self.reason}. Every process compiles anew.\nTry: the variable NUMBA_CACHE_DIR, "
-                "naming a directory of your own that has 50 MB of space left.",
+                f"sph: compiled code cannot be cached in {self.path or 'a cache directory'}: "
+                f"{self.reason}. Every process will compile again.\nTry: set the environment "
+                "variable NUMBA_CACHE_DIR to a directory of your own with 50 MB of free space.",
                 file=sys.stderr,
                 flush=True,
             )
 
-    def _refuse(self, reason: str) -> None:
-        self.reason = reason
+    def _refuse(self, reason: str | None) -> None:
+        self.reason = reason or "no reason is known"
 
 
 def _danger(status: os.stat_result) -> str | None:
-    """Why code from there might be somebody else's, or None."""
+    """Return why another user could have written the file or directory, or None."""
     if status.st_uid != os.geteuid():
-        return f"it belongs to another user (number {status.st_uid})"
+        return f"it belongs to another user (UID {status.st_uid})"
     if status.st_mode & (stat.S_IWGRP | stat.S_IWOTH):
         return "other users can write to it"
     return None
 
 
 def prune(place: Path, kept: int = KEPT) -> None:
-    """Remove the directories in `place` that were used longest ago, and that no process uses."""
+    """Remove the least recently used directories in `place` that no process uses; keep `kept`."""
     with suppress(OSError), os.scandir(place) as entries:
         ours = [
             (entry.stat(follow_symlinks=False).st_mtime, entry.path)
@@ -174,14 +181,14 @@ def _remove_unused(path: str) -> None:
 
 
 def _of_function(function):
-    """What a dispatcher keeps its code in; Numba's own cache for what comes from no file."""
+    """Return the cache of a function: this one, or Numba's if its source is not in a file."""
     if os.path.isfile(inspect.getfile(function)):
         return Entries(function)
     return caching.FunctionCache(function)
 
 
 class Entries(caching._Cache):
-    """The entries of one function, as Numba's dispatcher asks for them."""
+    """The cache entries of one function, with the interface that Numba's dispatcher uses."""
 
     def __init__(self, function):
         self._function = function
@@ -198,7 +205,7 @@ class Entries(caching._Cache):
         return str(directory().path)
 
     def load_overload(self, sig, target_context):
-        """The compiled function, or None where it must be compiled."""
+        """Return the compiled function, or None if it must be compiled."""
         target_context.refresh()
         if directory().descriptor is None:
             return None
@@ -211,14 +218,14 @@ class Entries(caching._Cache):
             if stored != key:
                 return None
             return compiler.CompileResult._rebuild(target_context, *payload)
-        except Exception:  # whatever is wrong with it, it can be compiled
+        except Exception:  # a damaged entry is compiled again
             return None
 
     def save_overload(self, sig, data):
         if directory().descriptor is None:
-            directory().tell()
-        # an edit while the program started: what was compiled is not of the directory's sources
-        elif fingerprint.sources() == fingerprint.facts()["sources of sph"]:
+            directory().warn()
+        # if sources were edited after the start, this code does not belong in the directory
+        elif fingerprint.are_sources_unchanged():
             key = self._whole_key(sig, data.codegen)
             directory().write(self._name(key), dumps((key, data._reduce())))
 
@@ -229,7 +236,7 @@ class Entries(caching._Cache):
     def flush(self): ...
 
     def _whole_key(self, sig, codegen):
-        return directory().path.name, self._key, repr(sig), codegen.magic_tuple()
+        return directory().name, self._key, repr(sig), codegen.magic_tuple()
 
     def _name(self, key) -> str:
         digest = hashlib.sha256(repr(key).encode()).hexdigest()

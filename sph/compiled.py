@@ -1,6 +1,8 @@
 """What all compiled code shares: flags, verbs of the models, vectorisable minimum and maximum."""
 
 import inspect
+from collections.abc import Callable
+from typing import Any, TypeVar
 
 import numpy as np
 from llvmlite import ir
@@ -15,21 +17,24 @@ compile_cache.install()
 FASTMATH = {"nsz", "arcp", "contract", "afn", "reassoc"}
 
 # NumPy's error model: with Python's check for division by zero no loop would vectorise.
-FLAGS = {"fastmath": FASTMATH, "error_model": "numpy"}
+FLAGS: dict[str, Any] = {"fastmath": FASTMATH, "error_model": "numpy"}
 
 # Options of every compiled function: @njit(**COMPILED). None is compiled with parallel=True: passes
 # release the interpreter's lock and run over ranges of blocks on Python threads (sph/threads.py),
 # which costs no second compilation and takes nested models.
-COMPILED = {"cache": True, "nogil": True, **FLAGS}
+COMPILED: dict[str, Any] = {"cache": True, "nogil": True, **FLAGS}
 
 
 # For functions with floating-point sums that others call. Where a callee is not inlined there are
 # two copies of it, compiled in different company, which may round differently: the process that
 # compiles calls one, and a process that finds the caller in the cache the other.
-INLINED = {**FLAGS, "forceinline": True}
+INLINED: dict[str, Any] = {**FLAGS, "forceinline": True}
 
 
-def verb(stub):
+Verb = TypeVar("Verb", bound=Callable[..., Any])
+
+
+def verb(stub: Verb) -> Verb:
     """Make `stub(model, ...)` resolve at compile time to that method of the model's class.
 
     A model (kernel, equation of state, viscosity) is a NamedTuple whose methods are its formulas:
@@ -45,7 +50,8 @@ def verb(stub):
 
     # Numba compares the names of the parameters, so the function it gets must have the stub's own.
     source = f"lambda {', '.join(parameters)}: pick({', '.join(parameters)})"
-    overload(stub, jit_options=INLINED)(eval(source, {"pick": pick}))
+    found = eval(source, {"pick": pick})
+    overload(stub, jit_options=INLINED)(found)  # type: ignore[arg-type]
     return stub
 
 
@@ -86,11 +92,11 @@ def smaller(a, b):
     return np.minimum(a, b)
 
 
-@overload(larger, jit_options=FLAGS)
+@overload(larger, jit_options=FLAGS)  # type: ignore[arg-type]
 def _larger(a, b):
     return lambda a, b: _maxnum(a, b)
 
 
-@overload(smaller, jit_options=FLAGS)
+@overload(smaller, jit_options=FLAGS)  # type: ignore[arg-type]
 def _smaller(a, b):
     return lambda a, b: _minnum(a, b)

@@ -1,19 +1,21 @@
-"""Docstrings that the program shows, also where Python runs without them (-OO)."""
+"""Docstrings that the program prints, available also under `python -OO`."""
 
 import ast
 import inspect
 import textwrap
+from typing import Any
 
 
 def docstring(thing) -> str:
-    """The docstring of a module, class or function, indentation removed; empty if it has none.
+    """Return the docstring of a module, class or function without indentation, or "".
 
-    Under `python -OO`, or PYTHONOPTIMIZE=2, it is read from the source.
+    Under `python -OO`, or PYTHONOPTIMIZE=2, the docstring is read from the source file.
     """
     if thing.__doc__:
         return inspect.cleandoc(thing.__doc__)
     try:
         tree = ast.parse(textwrap.dedent(inspect.getsource(thing)))
-    except (OSError, TypeError):  # there is no source
+    except (OSError, TypeError):  # the source is not available
         return ""
-    return ast.get_docstring(tree if inspect.ismodule(thing) else tree.body[0]) or ""
+    documented: Any = tree if inspect.ismodule(thing) else tree.body[0]
+    return ast.get_docstring(documented) or ""

@@ -1,8 +1,11 @@
-"""Errors a user meets: a message that says what to do, and the exit code of the program."""
+"""Errors that are reported to the user, each with the exit code of the program.
+
+Their messages say what was wrong, where, what was expected and what to try.
+"""
 
 
 class SphError(Exception):
-    """Shown as its message alone, without a traceback."""
+    """Base class. The command line prints the message, without a traceback."""
 
     exit_code = 1
 
@@ -14,7 +17,10 @@ class ConfigError(SphError):
 
 
 class NumericalError(SphError):
-    """The run came to numbers that mean nothing; `particle`: the ID of one that shows it, or 0."""
+    """The run produced NaNs or unphysical values.
+
+    particle: ID of a particle that is affected, or 0 if the error concerns the whole run.
+    """
 
     exit_code = 3
 
@@ -24,13 +30,13 @@ class NumericalError(SphError):
 
 
 class FileError(SphError):
-    """A file or directory is missing, not what it should be, or cannot be written."""
+    """A file or directory is missing, of the wrong kind, unreadable or cannot be written."""
 
     exit_code = 4
 
 
 class AtEnd(SphError):
-    """There is nothing left to compute, and nothing was asked for that would change that."""
+    """The run has already reached its end time, so there is nothing to compute."""
 
     exit_code = 0
 
@@ -42,5 +48,5 @@ class Stopped(SphError):
 
 
 def first_line(message: str) -> str:
-    """What a message says first, without its full stop."""
+    """Return the first line of a message, without its full stop."""
     return message.partition("\n")[0].rstrip(".")

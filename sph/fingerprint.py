@@ -1,5 +1,8 @@
-"""What decides the bits of a result besides the configuration: sources, versions, processor,
-settings of the compiler."""
+"""Everything besides the configuration that can change the bits of a result.
+
+These are the sources of sph, the versions of Python and libraries, the processor and the settings
+of the compiler.
+"""
 
 import functools
 import hashlib
@@ -16,22 +19,38 @@ import numpy as np
 from llvmlite import binding
 
 import sph
+from sph import registry
 
-# Settings of Numba that change no compiled number: output for debugging, paths, CUDA, the number of
-# threads (of parallel=True, which sph does not use). All others count, also those that a later
-# Numba adds: a setting that counts needlessly costs a compilation, one that is missing wrong bits.
+# Settings of Numba that do not change compiled code: debugging output, paths, CUDA, the number of
+# threads (for parallel=True, which sph does not use). All others count, including those that a
+# later Numba adds: a needless entry costs a compilation, a missing one gives wrong results.
 _NOT_CODE = re.compile(
     r"DEBUG(?!INFO).*|(DUMP|CACHE|IS)_.*|.*(CUDA|TRACE|WARN|DIAGNOSTICS).*|.*NUM_THREADS|_.*"
     r"|THREADING_LAYER.*|NRT_STATS|LLVM_PASS_TIMINGS|FUNCTION_CACHE_SIZE|HIGHLIGHT_DUMPS|ANNOTATE"
     r"|HTML|DIFF_IR|GDB_BINARY|COLOR_SCHEME|SHOW_HELP|DEVELOPER_MODE|PYVERSION|MACHINE_BITS"
 )
-# NumPy chooses among its loops by the processor's features; these variables narrow the choice.
+# NumPy chooses loops by the features of the processor; these variables restrict the choice.
 _NUMPY_SETTINGS = ("NPY_DISABLE_CPU_FEATURES", "NPY_ENABLE_CPU_FEATURES")
 
 
 def sources() -> str:
-    """Hash of every source file of the package, 16 digits; empty where there is no source file."""
-    root = Path(sph.__file__).parent
+    """Return a hash of all source files of the package, 16 digits; "" if there are none."""
+    return _hash_of_sources(Path(sph.__file__).parent)
+
+
+def extensions() -> dict[str, str]:
+    """Return the hash of the source files in `sph_extensions`, if there are any."""
+    hashes = [_hash_of_sources(Path(folder)) for folder in registry.extension_folders()]
+    return {"sources of sph_extensions": " ".join(hashes)} if any(hashes) else {}
+
+
+def are_sources_unchanged() -> bool:
+    """Return whether the source files are those of the first call of `facts`."""
+    now = {"sources of sph": sources(), **extensions()}
+    return all(facts().get(name) == value for name, value in now.items())
+
+
+def _hash_of_sources(root: Path) -> str:
     digest, files = hashlib.sha256(), sorted(root.rglob("*.py"))
     for path in files:
         digest.update(str(path.relative_to(root)).encode())
@@ -41,10 +60,11 @@ def sources() -> str:
 
 @functools.cache
 def facts() -> dict[str, str]:
-    """Name and value of each thing that decides bits, as it was at the first call."""
+    """Return name and value of everything that can change bits, as found at the first call."""
     features = binding.get_host_cpu_features()
     return {
         "sources of sph": sources(),
+        **extensions(),
         "Python": platform.python_version(),
         "NumPy": np.__version__,
         "Numba": numba.__version__,
@@ -58,7 +78,7 @@ def facts() -> dict[str, str]:
 
 
 def settings() -> dict[str, str]:
-    """Name and value of each setting that changes code: Numba's, and NumPy's where one is set."""
+    """Return name and value of each setting that changes code: Numba's, and NumPy's if set."""
     values = sorted(vars(numba.core.config).items())
     found = {
         f"NUMBA_{name}": _plain(value)
@@ -69,25 +89,26 @@ def settings() -> dict[str, str]:
 
 
 def _plain(value) -> str:
-    """A setting's value, the same whether it is a default or was read from a variable."""
-    value = getattr(value, "_raw_value", value)  # of NUMBA_OPT, which may be "max"
+    """Return a setting's value as text, equal for a default and for a value from a variable."""
+    value = getattr(value, "_raw_value", value)  # for NUMBA_OPT, which may be "max"
     return str(int(value) if isinstance(value, bool) else value)
 
 
 def key() -> str:
-    """16 digits that no two sets of facts share."""
+    """Return a hash of `facts`, 16 digits."""
     return hashlib.sha256(as_json().encode()).hexdigest()[:16]
 
 
 def as_json() -> str:
-    """The facts as one line of JSON, which a checkpoint keeps."""
+    """Return `facts` as one line of JSON, which is stored in checkpoints."""
     return json.dumps(facts(), sort_keys=True)
 
 
 def differences(then: str | None) -> str | None:
-    """Why bits may differ from those of a checkpoint, whose facts are `then` as `as_json` gave it.
+    """Return why results may differ in bits from those of a checkpoint, or None.
 
-    None where the facts are equal, or where the checkpoint names none.
+    then: the result of `as_json` stored in the checkpoint. None is returned if the facts are equal
+    or the checkpoint has none.
     """
     try:
         before = json.loads(then or "")
@@ -97,17 +118,17 @@ def differences(then: str | None) -> str | None:
         return None
     now = facts()
     changed = [name for name in {**now, **before} if before.get(name) != now.get(name)]
-    told = ", ".join(_told(name, before.get(name), now.get(name)) for name in changed)
+    listed = ", ".join(_change(name, before.get(name), now.get(name)) for name in changed)
     return (
         "the results may differ in their last digits from those of the uninterrupted run, because "
-        f"the checkpoint was computed with other {told}"
+        f"the checkpoint was computed with other {listed}"
     )
 
 
-def _told(name: str, before, now) -> str:
-    """A fact that differs, with both values where these are short."""
+def _change(name: str, before, now) -> str:
+    """Return a fact that differs, with both values if they are short."""
     shown = ["not set" if value is None else ascii(value).strip("'") for value in (before, now)]
-    if name == "sources of sph" or max(map(len, shown)) > 40:
+    if name.startswith("sources of") or max(map(len, shown)) > 40:
         return ascii(name).strip("'")
     return "{} ({}, here {})".format(ascii(name).strip("'"), *shown)
 

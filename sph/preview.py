@@ -1,4 +1,4 @@
-"""What a run would be: the answer of `sph run --dry-run`."""
+"""A preview of a run: the output of `sph run --dry-run`."""
 
 import math
 from typing import NamedTuple
@@ -15,14 +15,14 @@ from sph.runner import output_times, threads_of
 from sph.scene import Scene
 from sph.simulation import Simulation
 
-# Of more particles than these, so many are built and their figures scaled: it takes some seconds.
+# Larger runs are previewed with this many particles, and the figures scaled: it takes seconds.
 MOST_BUILT = 20_000
-# The most that are timed: some, so that the lists they share are among their cost.
+# Several steps are timed, since they share the cost of a list build; at most these.
 TIMED_STEPS, TIMED_SECONDS = 20, 2.0
 
 
 class Sample(NamedTuple):
-    """A few steps of a run, of all its particles or of fewer."""
+    """A few steps of a run, with all of its particles or fewer."""
 
     parts: tuple[list[str], list[str]]  # compiled in, left out
     particles: int
@@ -35,13 +35,13 @@ class Sample(NamedTuple):
 
 
 def describe(config: Config) -> str:
-    """The scene in words: its parts, particles, memory, and steps at the size of an early one.
+    """The scene in words: parts, particles, memory, and the number of steps at an early step size.
 
-    Steps are made and thrown away: of this run or, beyond MOST_BUILT particles, of the same one
-    with fewer, from which memory and cost are scaled with N, and the step with N^(-1/D).
-    Raises NumericalError where the run could not begin.
+    Makes a few steps and discards them. Beyond MOST_BUILT particles it runs fewer particles and
+    scales memory and cost with N, the step with N^(-1/D). Raises NumericalError where the run could
+    not start.
     """
-    standard_streams.note("preparing: a scene that is new compiles its code, for up to a minute")
+    standard_streams.note("preparing: a new kind of scene compiles its code, for up to a minute")
     sample, is_whole = _sampled(config)
     particles = sample.particles if is_whole else config.problem.n
     ratio = particles / sample.particles
@@ -67,7 +67,7 @@ def describe(config: Config) -> str:
         f"step {sample.steps} is {dt:.4g}: at that size {_count(steps, is_whole)} steps to "
         f"t = {config.time.end:g}.",
         f"Time: a step costs {per_step:.2g} CPU s, so some {per_step * steps:.2g} CPU s in all on "
-        f"{threads_of(config)} thread(s); steps that grow or shrink change that.",
+        f"{threads_of(config)} thread(s), if steps keep this size.",
         f"Output: {outputs} checkpoints.",
     ]
     return "\n".join(lines)
@@ -81,9 +81,9 @@ def _count(number: float, is_exact: bool) -> str:
 
 
 def _sampled(config: Config) -> tuple[Sample, bool]:
-    """A sample and whether it is the run itself, not one with fewer particles.
+    """A sample, and whether it has all particles of the run.
 
-    Of those the fewest from MOST_BUILT on that the scene bears. Raises NumericalError.
+    Else it has the fewest from MOST_BUILT on for which the scene is valid. Raises NumericalError.
     """
     n = MOST_BUILT
     while n < config.problem.n:
@@ -103,7 +103,7 @@ def _sample(config: Config) -> Sample:
     clock = Clock()
     simulation = Simulation.start(Scene(config), threads_of(config), clock)
     limit = simulation.limit
-    for _ in range(2):  # the first to find their code loaded come after these
+    for _ in range(2):  # later steps find their code loaded
         simulation.advance(math.inf)
     began, timed = clock.cpu, 0
     while timed == 0 or (
@@ -118,7 +118,7 @@ def _sample(config: Config) -> Sample:
     simulation.close()
     clock.close()
     return Sample(
-        simulation.scene.parts(),
+        simulation.scene.described(),
         simulation.particles.number,
         neighbours_per_particle(simulation),
         bytes_held(simulation),

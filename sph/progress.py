@@ -1,4 +1,4 @@
-"""Progress of a run or a sweep: a bar with the time left on a terminal, plain lines elsewhere."""
+"""Progress of one run or of many: a bar with the time left on a terminal, else plain lines."""
 
 import os
 import sys
@@ -6,15 +6,21 @@ import time
 
 from sph import standard_streams
 
-# Plain lines come at least this many seconds apart, so that a log stays short.
+# Plain lines are at least this many seconds apart, so that a log stays short.
 LINE_INTERVAL = 10.0
 
 
-class Lines:
-    """A line now and then, for logs."""
+class Messages:
+    """What every kind of progress can do: a line on stderr."""
 
     def note(self, text):
         standard_streams.note(text)
+
+    def close(self): ...
+
+
+class Lines(Messages):
+    """Of one run: a line every LINE_INTERVAL, for logs."""
 
     def start(self, begin, end):
         self.end = end
@@ -23,7 +29,7 @@ class Lines:
 
     def step(self, simulation):
         now = time.monotonic()
-        if self._from is None:  # the first step may have compiled: it says nothing of the pace
+        if self._from is None:  # later steps are faster: the first one may have compiled
             self._from = simulation.time, now
         if now - self._last < LINE_INTERVAL:
             return
@@ -34,7 +40,7 @@ class Lines:
         )
 
     def _left(self, simulated, now):
-        begin, started = self._from
+        begin, started = self._from or (simulated, now)
         if not simulated > begin:
             return ""
         left = (now - started) * (self.end - simulated) / (simulated - begin)
@@ -43,11 +49,9 @@ class Lines:
     def wrote(self, path, simulation):
         self.note(f"t = {simulation.time:.6g}: wrote {path.name}")
 
-    def close(self): ...
-
 
 class Bar(Lines):
-    """A bar over the simulated time."""
+    """Of one run: a bar over the simulated time."""
 
     FORMAT = "{percentage:3.0f}%|{bar}| {desc} [{elapsed}, {remaining} left]"
 
@@ -74,46 +78,60 @@ class Bar(Lines):
             self._bar.close()
 
 
-class PointLines:
-    """A line for each point of a sweep that has ended."""
+class RunLines(Messages):
+    """Of many runs: a line for each run that ends."""
 
-    def note(self, text):
-        standard_streams.note(text)
+    def __init__(self, what: str, total: int | None, done: int):
+        """what: the runs are called so, in the plural; total: None where it is not known before.
 
-    def ended(self, count): ...
+        done: the number of runs that ended in an earlier call.
+        """
+        self.what, self.total, self.done = what, total, done
+        if done:
+            self.note(f"{done} of {total} {what} are done already")
 
-    def close(self): ...
+    def ended(self, text):
+        """A run has ended, as `text` says."""
+        self.done += 1
+        count = "" if self.total is None else f"[{self.done:{len(str(self.total))}d}/{self.total}] "
+        self.note(f"{count}{text}")
 
 
-class PointBar(PointLines):
-    """The same above a bar over the points."""
+class RunBar(RunLines):
+    """Of many runs: the same lines above a bar over the runs."""
 
-    FORMAT = "{percentage:3.0f}%|{bar}| {n_fmt} of {total_fmt} points [{elapsed}, {remaining} left]"
+    FORMAT = "{percentage:3.0f}%|{bar}| {n_fmt} of {total_fmt} {unit} [{elapsed}, {remaining} left]"
 
-    def __init__(self, points, ended):
+    def __init__(self, what: str, total: int, done: int):
         import tqdm
 
-        # what an earlier call has done says nothing of the pace of this one
-        self._bar = tqdm.tqdm(total=points, initial=ended, bar_format=self.FORMAT, leave=False)
+        # `initial`: the runs of an earlier call do not count for the pace of this one
+        self._bar = tqdm.tqdm(
+            total=total, initial=done, unit=what, bar_format=self.FORMAT, leave=False
+        )
+        super().__init__(what, total, done)
 
     def note(self, text):
         self._bar.write(text, file=sys.stderr)
 
-    def ended(self, count):
-        self._bar.update(count - self._bar.n)
+    def ended(self, text):
+        super().ended(text)
+        self._bar.update()
 
     def close(self):
         self._bar.close()
 
 
-def suited():
-    """A bar where someone is watching a terminal, lines otherwise."""
+def suited() -> Lines:
+    """Progress of one run: a bar on a terminal, lines elsewhere."""
     return Bar() if _is_watched() else Lines()
 
 
-def suited_to_points(points, ended):
-    """The same for a sweep of so many points, of which so many have ended."""
-    return PointBar(points, ended) if _is_watched() else PointLines()
+def suited_to_runs(what: str, total: int | None, done: int = 0) -> RunLines:
+    """Progress of many runs, see `RunLines`: a bar on a terminal, lines elsewhere."""
+    if total is None or not _is_watched():
+        return RunLines(what, total, done)
+    return RunBar(what, total, done)
 
 
 def _is_watched():

@@ -1,12 +1,13 @@
-"""Whether float64 resolves a state: positions against spacings, velocities against sound.
+"""Check that float64 resolves positions (against the particle spacing) and velocities (against c).
 
-The gap between a number and the next grows with the number (`np.spacing`). Far from 0 the gap
-becomes a share of the particle spacing, in fast bulk motion a share of the speed of sound, and the
-sums of SPH, which are differences of such numbers, lose that share. Measured with thresholds off:
+The gap between a float64 number and the next grows with the number (`np.spacing`). Far from 0 it
+becomes a noticeable fraction of the particle spacing, and in fast bulk motion of the speed of
+sound c. The sums of SPH use differences of such numbers and lose that fraction. Measured with the
+limits switched off:
 `uniform` (1-D 100 particles, 2-D 225 hexagonal; t = 0.5 and 2) with lower = 1e6 ... 1e14, Sod's
-tube (198) there, and `shock_tube` (200) in bulk motion of Mach 1e3 ... 1e15, both against the same
-run at 0. The largest error of any particle is proportional to the ratio gap/spacing or
-gap/(speed of sound):
+tube (198) at the same places, and `shock_tube` (200) in bulk motion at Mach 1e3 ... 1e15, the last
+two compared with the run at 0. The largest error of any particle is proportional to gap/spacing or
+gap/c:
 
 | ratio | uniform: v/c  | uniform: u    | Sod: density | Sod: v | Sod in motion: v |
 | 1e-8  | 1e-8 ... 7e-8 | 1e-8 ... 2e-8 | 2e-8         | 6e-8   | 5e-8             |
@@ -21,18 +22,18 @@ import numpy as np
 
 from sph.faults import fault
 
-# Steady states are wrong by up to some five times the ratio: by 1e-3, and by 1e-6.
+# Steady states have errors up to five times the ratio, here 1e-3 and 1e-6.
 REFUSED = 2e-4
 DOUBTED = 2e-7
 
 
 class Gap(NamedTuple):
-    """The least resolved number of a state: a position or velocity, and what it must resolve."""
+    """The position or velocity that float64 resolves worst, compared with its scale."""
 
     kind: str  # "position" or "velocity"
-    index: int  # of the particle in memory order
-    size: float  # distance to the next float64
-    scale: float  # the particle's spacing, or speed of sound and relative velocity together
+    index: int  # type: ignore[assignment]  # of the particle in memory order
+    size: float  # distance to the next float64 number
+    scale: float  # the particle spacing, or the speed of sound plus the relative velocity
 
     @property
     def ratio(self) -> float:
@@ -40,11 +41,11 @@ class Gap(NamedTuple):
 
 
 def largest_gap(particles, spacing, sound_speed) -> Gap:
-    """The gap with the largest ratio to its scale, of any particle and kind.
+    """Return the gap with the largest ratio to its scale, over all particles and both kinds.
 
     particles: positions and velocities (D, N); spacing, sound_speed: (N,) or one number.
-    A velocity is compared with c + |v - median of v|: gas at Mach 1e17 that is all in one motion is
-    not resolved, cold gas whose streams meet at such a speed is.
+    A velocity is compared with c + |v - median of v|. So gas in uniform motion at Mach 1e17 is not
+    resolved, but cold streams that collide at that speed are.
     """
     departure = particles.velocity - np.median(particles.velocity, axis=1, keepdims=True)
     scales = {
@@ -54,7 +55,7 @@ def largest_gap(particles, spacing, sound_speed) -> Gap:
     gaps = []
     for kind, scale in scales.items():
         size = np.spacing(np.abs(getattr(particles, kind)).max(axis=0))
-        # pressureless gas at rest has no sound that could be lost, and the watchdog reports NaN
+        # pressureless gas at rest has scale 0 and needs no check; the watchdog reports NaN
         ratio = np.divide(size, scale, out=np.zeros_like(size), where=scale > 0.0)
         i = int(np.argmax(np.nan_to_num(ratio, nan=0.0)))
         gaps.append(Gap(kind, i, float(size[i]), float(scale[i])))
@@ -62,9 +63,9 @@ def largest_gap(particles, spacing, sound_speed) -> Gap:
 
 
 def check_extent(simulation) -> None:
-    """Raise NumericalError, before neighbours are looked for, where positions cannot be resolved.
+    """Raise NumericalError if float64 does not resolve positions. Called before neighbour search.
 
-    What the box holds on average is the spacing: far enough away, particles coincide.
+    The spacing is the mean spacing in the box.
     """
     box = simulation.scene.domain.box
     n = simulation.particles.number
@@ -73,12 +74,12 @@ def check_extent(simulation) -> None:
 
 
 def check(simulation) -> None:
-    """Raise NumericalError where rounding takes more than REFUSED; supports must be known."""
+    """Raise NumericalError if a ratio exceeds REFUSED. Support radii must be known."""
     _refuse(simulation, _gap_of(simulation))
 
 
 def doubt(simulation) -> str | None:
-    """What rounding does to the results, in words, where it takes more than DOUBTED."""
+    """Return a warning on the effect of rounding if a ratio exceeds DOUBTED, else None."""
     gap = _gap_of(simulation)
     if not gap.ratio > DOUBTED:
         return None
@@ -87,11 +88,12 @@ def doubt(simulation) -> str | None:
 
 
 def _gap_of(simulation) -> Gap:
-    p, models, eos = simulation.particles, simulation.scene.models, simulation.scene.eos
-    with np.errstate(all="ignore"):  # gas that is torn apart, which the watchdog reports
+    p, scene = simulation.particles, simulation.scene
+    models, eos = scene.formulation.models, scene.eos
+    with np.errstate(all="ignore"):  # unphysical states, which the watchdog reports
         sound_speed = eos.sound_speed(p.density, eos.pressure(p.density, p.internal_energy))
     spacing = p.support / (models.support_ratio * models.eta)
-    # a density below 0 marks a particle that has no support, which has an error of its own
+    # a density below 0 marks a particle without a support radius, which is reported elsewhere
     return largest_gap(p, np.where(p.density > 0.0, spacing, np.inf), sound_speed)
 
 
@@ -102,17 +104,18 @@ def _refuse(simulation, gap: Gap) -> None:
 
 
 def _in_words(simulation, gap: Gap) -> tuple[str, str]:
-    """What is not resolved, and what to try."""
+    """Return the description of what is not resolved, and what to try."""
     p = simulation.particles
     value = ", ".join(f"{x:.6g}" for x in getattr(p, gap.kind)[:, gap.index])
     measure, remedy = {
-        "position": ("the particle spacing", "shift problem.domain nearer to 0"),
+        "position": ("the particle spacing", "shift problem.domain closer to 0"),
         "velocity": (
-            "the speed of sound", "subtract the bulk velocity from all particles, or hotter gas",
+            "the speed of sound", "subtract the bulk velocity, or use hotter gas",
         ),
     }[gap.kind]  # fmt: skip
     return (
         f"float64 does not resolve the {gap.kind} ({value}) of particle {p.id[gap.index]}: the "
-        f"next number is {gap.size:.3g} away, {gap.ratio:.3g} of {measure} ({gap.scale:.3g})",
+        f"next float64 number is {gap.size:.3g} away, which is {gap.ratio:.3g} of {measure} "
+        f"({gap.scale:.3g})",
         remedy,
     )

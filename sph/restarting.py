@@ -1,4 +1,4 @@
-"""Go on from a checkpoint: what may change, where it goes on, and that it does bit for bit."""
+"""Restart from a checkpoint, bit for bit as if the run had not stopped if no setting changes."""
 
 import dataclasses
 from collections.abc import Sequence
@@ -8,7 +8,7 @@ import numpy as np
 
 from sph import config as configuration
 from sph import fingerprint
-from sph.analysis import reference
+from sph.analysis import reference, summary
 from sph.clock import Clock
 from sph.config import Config, restarts
 from sph.config.restarts import Change
@@ -19,21 +19,24 @@ from sph.output import checkpoint as checkpoints
 from sph.output.checkpoint import Checkpoint
 from sph.output.files import copy_file, is_same_path
 from sph.output.history import History
+from sph.output.history import read as read_history
 from sph.output.offenders import PART
 from sph.output.run_directory import RunDirectory, checkpoint_number, find
 from sph.runner import Runner, new_history, output_times, session, threads_of
 from sph.scene import Scene
 from sph.simulation import Simulation
+from sph.totals import Budget
 
 
 def restart(
     source: Path, overrides: Sequence[str], directory: Path | None, progress
 ) -> tuple[dict, RunDirectory]:
-    """Go on from `source`, a checkpoint or a run directory, whose last good one is then taken.
+    """Continue a run. Return the summary and the run directory.
 
-    Later checkpoints are replaced. overrides: `a.b=VALUE`; directory: a new run directory, or None
-    for the one that the checkpoint is in. Returns the summary and the run directory. Raises as
-    `run`, and FileError, ConfigError and AtEnd before anything is changed.
+    source: a checkpoint, or a run directory, of which the last valid checkpoint is used; overrides:
+    `a.b=VALUE`; directory: a new run directory, or None for that of the checkpoint, in which later
+    checkpoints are replaced. Raises as `run`, and FileError, ConfigError and AtEnd before anything
+    is changed.
     """
     home, path = find(source)
     checkpoint = checkpoints.read(path)
@@ -41,8 +44,8 @@ def restart(
         home.check_belongs(path, checkpoint, directory)
     if PART in checkpoint.lineage:
         raise FileError(
-            f"{path} holds {PART}: there is no going on from it.\n"
-            "Try: the run's last good checkpoint, with other settings."
+            f"{path} contains only {PART}: it cannot be restarted.\n"
+            "Try: the last valid checkpoint of the run, with other settings."
         )
     config = checkpoint.config.override(overrides)
     changed = restarts.changes(checkpoint.config, config)
@@ -63,7 +66,10 @@ def restart(
             restarts.lineage(checkpoint.step, checkpoint.time, changed),
         )
         next_step = _coming_step(config, checkpoint)
-        begun = dataclasses.replace(checkpoint, config=config, lineage=lineage, next_step=next_step)
+        begun = dataclasses.replace(
+            checkpoint, config=config, lineage=lineage, next_step=next_step,
+            budget=_budget(checkpoint, target),
+        )  # fmt: skip
         _begin_anew(target, number, begun, any(not one.key.startswith("run.") for one in changed))
         simulation = _resumed(begun, clock)
         if target.history.exists():
@@ -77,11 +83,11 @@ def restart(
 
 
 def _begin_anew(target: RunDirectory, number: int, begun: Checkpoint, is_changed: bool) -> None:
-    """Make the directory say what goes on from checkpoint `number`, at every moment one truth.
+    """Prepare the directory for a restart from checkpoint `number`; consistent at every moment.
 
-    What a later state left goes first. Then the settings go into the checkpoint itself, from which
-    every restart takes them: one that is stopped before its first step would lose them else.
-    config.toml, which nobody goes on from, is last.
+    First, files of later states are removed. Then the changed settings are written to the
+    checkpoint itself, so that they are not lost if the restart is stopped before its first step.
+    Last, config.toml is written, which no restart reads.
     """
     for old in (target.summary, target.offenders):
         old.unlink(missing_ok=True)
@@ -96,21 +102,33 @@ def _resumed(checkpoint: Checkpoint, clock: Clock) -> Simulation:
     origin = Origin(checkpoint.list_position, checkpoint.list_support, checkpoint.list_skin)
     return Simulation.resume(
         Scene(config), checkpoint.particles, checkpoint.time, checkpoint.step,
-        checkpoint.next_step, origin, threads_of(config), clock,
+        checkpoint.next_step, origin, threads_of(config), clock, checkpoint.budget,
     )  # fmt: skip
 
 
+def _budget(checkpoint: Checkpoint, target: RunDirectory) -> Budget | None:
+    """Return the energy budget of the checkpoint; the history has that of one of format 1."""
+    if checkpoint.budget is not None or not target.history.exists():
+        return checkpoint.budget
+    past = read_history(target.history)
+    rows = past["step"] <= checkpoint.step
+    if not rows.any():
+        return None
+    added = past["energy_added"][rows][-1] if "energy_added" in past else 0.0
+    return Budget(past["energy_injected"][rows][-1], added, summary.baseline(past))
+
+
 def _coming_step(config: Config, checkpoint: Checkpoint) -> float:
-    """The checkpoint's next step, or what becomes of it under other limits (eq 32)."""
+    """Return the checkpoint's next step, adapted to changed limits on the time step (eq 32)."""
     now, before, p = config.physics, checkpoint.config.physics, checkpoint.particles
     scene = Scene(config)
-    held, held_before = (s.step_bounds.held[0] for s in (scene, Scene(checkpoint.config)))
+    held, held_before = (s.step_bounds.courant for s in (scene, Scene(checkpoint.config)))
     step = checkpoint.next_step * (held / held_before)  # unchanged where both are: bit for bit
     if step > checkpoint.next_step:
         limit = step_size.StepLimit(step, 0, "checkpoint")
         step = step_size.before_contact(limit, scene.step_bounds, p, scene.domain).dt
     if now.energy_limit and not before.energy_limit:
-        warm = p.internal_energy > 0.0  # as for every step: what has no energy sets none
+        warm = p.internal_energy > 0.0  # as in step_size: u = 0 does not limit the step
         with np.errstate(divide="ignore"):
             times = p.internal_energy[warm] / np.abs(p.energy_rate[warm])
         step = min(step, float(held * np.min(times, initial=np.inf)))
@@ -118,7 +136,7 @@ def _coming_step(config: Config, checkpoint: Checkpoint) -> float:
 
 
 def _check_changes(changed: list[Change], config: Config, checkpoint: Checkpoint) -> None:
-    """Raise ConfigError where `config` wants what the particles of a checkpoint cannot give."""
+    """Raise ConfigError if a restart with the settings `config` is not possible."""
     wrong = restarts.refusals(changed)
     if config.time.end < checkpoint.time:
         wrong.append(
@@ -132,21 +150,21 @@ def _check_changes(changed: list[Change], config: Config, checkpoint: Checkpoint
 def _check_steps_left(
     source: Path, changed: list[Change], config: Config, time: float, is_closed: bool
 ) -> None:
-    """Raise ConfigError for settings that no step would be made with, AtEnd for a closed run."""
+    """Raise ConfigError for changed settings that no step would use, AtEnd for a completed run."""
     if any(output_times(config.time.end, config.output.interval, time)):
         return
     settings = [str(one) for one in changed if not one.key.startswith("run.")]
     if settings:
         raise ConfigError(
-            f"{source} is at its end, t = {time:g}: no step would be computed with "
+            f"{source} has reached its end, t = {time:g}: no step would be computed with "
             f"{', '.join(settings)}.\nTry: a later time.end, or an earlier checkpoint."
         )
     if is_closed:
-        raise AtEnd(f"{source} is at its end, t = {time:g}: set a later time.end to go on.")
+        raise AtEnd(f"{source} has reached its end, t = {time:g}. Try: a later time.end.")
 
 
 def _is_last_without_summary(home: RunDirectory | None, path: Path, time: float) -> bool:
-    """Whether a run was killed after its last checkpoint, `path`, and before its summary."""
+    """Return whether a run was killed after its last checkpoint, `path`, and before its summary."""
     if home is None or checkpoint_number(path) != checkpoint_number(home.checkpoints()[-1]):
         return False
     found = home.read_summary()
@@ -154,11 +172,11 @@ def _is_last_without_summary(home: RunDirectory | None, path: Path, time: float)
 
 
 def _note_other_settings(home: RunDirectory, before: Config, config: Config, progress) -> None:
-    """Say where config.toml differs from the checkpoint and --set: nothing of it is used.
+    """Note where config.toml, which is not used, differs from the checkpoint and --set.
 
     A user has edited it, or a restart with other settings was killed before its first checkpoint.
     """
-    if not home.config.is_file():  # a pipe would be waited for
+    if not home.config.is_file():  # reading a pipe would block
         return
     try:
         written = configuration.load(home.config)
@@ -174,24 +192,26 @@ def _note_other_settings(home: RunDirectory, before: Config, config: Config, pro
         )
         progress.note(
             f"{home.config} has {str(one).replace('(was', '(the checkpoint:', 1)}, which is not "
-            f"used: going on with {instead}"
+            f"used: continuing with {instead}"
         )
 
 
 def _note_damaged(home: RunDirectory, good: Path, progress) -> None:
-    """Say which checkpoints after the last good one were passed over."""
+    """Note which checkpoints after the last valid one are skipped."""
     for path in home.checkpoints():
         if checkpoint_number(path) > checkpoint_number(good):
-            why = "energy had drifted by then" if home.has_failed else "cannot be read"
-            progress.note(f"{path} is passed over ({why}): going on from {good.name}")
+            why = "energy has drifted" if home.has_failed else "it cannot be read"
+            progress.note(f"{path} is skipped ({why}): continuing from {good.name}")
 
 
 def _place_to_go_on(
     home: RunDirectory | None, path: Path, directory: Path | None
 ) -> tuple[RunDirectory, int]:
-    """The run directory to go on in, filled where it is a new one; the checkpoint's number."""
+    """Return the run directory to continue in, filled if new, and the checkpoint number."""
     if directory is None and home is None:
-        raise FileError(f"{path} is not in a run directory.\nTry: -o DIR, to go on in a new one.")
+        raise FileError(
+            f"{path} is not in a run directory.\nTry: -o DIR, to continue in a new one."
+        )
     if directory is None or (home is not None and is_same_path(directory, home.path)):
         return home, checkpoint_number(path)
     target = RunDirectory.create(directory)

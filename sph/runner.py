@@ -1,4 +1,4 @@
-"""Run a simulation to its end: checkpoints, history, progress, and the summary it closes with."""
+"""The loop of a run over steps and outputs: checkpoints, history, progress and summary."""
 
 import itertools
 import math
@@ -26,15 +26,15 @@ from sph.simulation import Simulation
 from sph.stop_signals import stop_signals
 from sph.threads import available_processors
 
-# A time closer than this to an output, relative to the interval or the end, is that output.
+# Times closer than this, relative to the output interval or the end, count as equal.
 SAME_TIME = 1e-9
 
 
 def run(config: Config, directory: RunDirectory, progress) -> dict:
-    """Run `config` from its initial state in an empty run directory; returns the summary.
+    """Run `config` from its initial state in an empty run directory. Return the summary.
 
-    `progress` has note(text), start(time, end), step(simulation), wrote(path, simulation) and
-    close(). Raises NumericalError or Stopped, with what was reached kept in the directory, and
+    progress: an object with note(text), start(time, end), step(simulation), wrote(path, simulation)
+    and close(). Raises NumericalError and Stopped, after the files of the run are written, and
     FileError.
     """
     with session(directory, config, progress) as (stopped_by, clock):
@@ -47,8 +47,8 @@ def run(config: Config, directory: RunDirectory, progress) -> dict:
             raise _failed_at_start(error, simulation, directory) from error
         if simulation.held_supports:
             progress.note(
-                f"{simulation.held_supports} particle(s) have too few neighbours: their supports "
-                f"are held at {simulation.scene.max_support:.4g} (physics.max_support)"
+                f"{simulation.held_supports} particle(s) have too few neighbours: their support "
+                f"radius is limited to {simulation.scene.max_support:.4g} (physics.max_support)"
             )
         history = new_history(config, simulation, directory)
         runner = Runner(config, directory, simulation, history, progress, stopped_by)
@@ -57,17 +57,17 @@ def run(config: Config, directory: RunDirectory, progress) -> dict:
 
 @contextmanager
 def session(directory: RunDirectory, config: Config, progress) -> Iterator[tuple[list[str], Clock]]:
-    """What a run works in: alone in its directory, heeding signals (the list), by a clock."""
+    """Yield the list of stop signals and a clock, with the directory locked and signals handled."""
     if (threads := threads_of(config)) > (processors := available_processors()):
         progress.note(
-            f"run.threads = {threads}, but this process may use {processors} processor(s): more "
-            "threads than processors make a run no faster; its results stay the same"
+            f"run.threads = {threads}, but this process may use only {processors} processor(s): "
+            "more threads do not make the run faster, and do not change its results"
         )
-    # what is no number the watchdog finds, and names: NumPy's words would come before its own
+    # the watchdog reports non-finite values, so warnings of NumPy are not needed
     quiet = np.errstate(all="ignore")
     with directory.alone(), stop_signals() as stopped_by, closing(Clock()) as clock, quiet:
         clock.on_compilation = lambda: progress.note(
-            "compiling the code of this scene: up to a minute, in its first run only"
+            "compiling the code for these settings: up to a minute, only in the first run"
         )
         yield stopped_by, clock
 
@@ -75,14 +75,14 @@ def session(directory: RunDirectory, config: Config, progress) -> Iterator[tuple
 def _failed_at_start(
     error: NumericalError, simulation: Simulation, directory: RunDirectory
 ) -> NumericalError:
-    """The error with the neighbourhood: there is no history yet, nor a checkpoint to go on from."""
+    """Return the error with a table of neighbours; there is no history or checkpoint yet."""
     simulation.close()
     words = offenders.leave(directory.offenders, state_of(simulation), error.particle)
     return NumericalError(f"{error}\n{words}".rstrip(), error.particle)
 
 
 def state_of(simulation: Simulation, lineage: tuple[str, ...] = ()) -> Checkpoint:
-    """What a checkpoint holds of a simulation, also of one that failed at its start."""
+    """Return the checkpoint of a simulation, even of one that failed at its start."""
     particles, limit = simulation.particles, simulation.limit
     origin = simulation.search.origin or Origin(particles.position, particles.support, 0.0)
     return Checkpoint(
@@ -95,40 +95,27 @@ def state_of(simulation: Simulation, lineage: tuple[str, ...] = ()) -> Checkpoin
         list_skin=origin.skin,
         config=simulation.scene.config,
         lineage=lineage,
+        budget=simulation.budget,
     )
 
 
 def new_history(config: Config, simulation: Simulation, directory: RunDirectory) -> History:
-    extra = [*_of_the_scene(simulation), *config.problem.diagnostics(simulation.particles)]
+    extra = [*simulation.columns(), *config.problem.diagnostics(simulation.particles)]
     return History.create(directory.history, config.problem.dimension, extra)
 
 
-def _of_the_scene(simulation: Simulation) -> dict[str, float]:
-    """Columns of the history that only some scenes have."""
-    scene, columns = simulation.scene, {}
-    if scene.max_support < math.inf:
-        columns["held_supports"] = simulation.held_supports
-    if scene.is_filled:
-        columns["volume_ratio"] = simulation.volume_ratio
-    if scene.external is not None:
-        columns["potential_energy"] = simulation.totals.potential_energy
-    if scene.heating is not None:
-        columns["energy_added"] = simulation.energy_added
-    return columns
-
-
 def threads_of(config: Config) -> int:
-    """The number of threads a configuration asks for; "all" is every processor we may use."""
+    """Return the number of threads; "all" is every processor that the process may use."""
     if config.run.threads == "all":
         return available_processors()
     return config.run.threads
 
 
 def output_times(end: float, interval: float, after: float = 0.0) -> Iterator[float]:
-    """Times of the checkpoints later than `after`: every interval, and the end."""
+    """Yield the times of checkpoints after `after`: multiples of `interval`, and `end`."""
     same = SAME_TIME * min(interval, end)
     for k in itertools.count(max(1, math.floor(after / interval))):
-        # to the digits a decimal number keeps: 3 x 0.1 is 0.3, where a run to 0.3 would end
+        # rounded to 15 digits, so that 3 x 0.1 equals 0.3, the end of a run to 0.3
         time = float(f"{k * interval:.15g}")
         if time >= end - same:
             break
@@ -139,7 +126,7 @@ def output_times(end: float, interval: float, after: float = 0.0) -> Iterator[fl
 
 
 class Runner:
-    """The loop over steps and outputs of one session."""
+    """The loop over steps and outputs, from a start or a restart."""
 
     def __init__(self, config, directory, simulation, history, progress, stopped_by):
         self.config = config
@@ -147,7 +134,7 @@ class Runner:
         self.simulation = simulation
         self.history = history
         self.progress = progress
-        self.stopped_by = stopped_by  # signals that came, see stop_signals
+        self.stopped_by = stopped_by  # names of received signals, see stop_signals
         self.number = 0  # of the next checkpoint
         self.saved_step = None  # step of the last checkpoint
         self.lineage = ()
@@ -165,24 +152,15 @@ class Runner:
             if past["step"].size:
                 self.wall_before = past["wall_seconds"][-1]
                 self.cpu_before = past["cpu_seconds"][-1]
-                self._recall(past)
-            else:  # a lone checkpoint: it begins the history, and has no limiter to tell
+            else:  # a checkpoint without history: begin one, whose first row has no limiter
                 self._record()
             return self._to_end()
-
-    def _recall(self, past: dict[str, np.ndarray]) -> None:
-        """What the simulation counts from the start of the run on, out of the history."""
-        simulation = self.simulation
-        simulation.energy_injected = past["energy_injected"][-1]
-        if "energy_added" in past:
-            simulation.energy_added = past["energy_added"][-1]
-        simulation.go_on_from(summary.baseline(past))
 
     @contextmanager
     def _closing(self):
         try:
             yield
-        except BaseException:  # what ends the run is to be told, not what its end runs into
+        except BaseException:  # report this error, not one of closing the history
             with suppress(FileError):
                 self.history.close()
             raise
@@ -212,16 +190,16 @@ class Runner:
         return self._close("done")
 
     def _failed(self, error: NumericalError) -> NumericalError:
-        """The error with what else a user needs: the neighbourhood, and where to go on from."""
+        """Return the error with a table of neighbours and the checkpoint to restart from."""
         words = offenders.leave(self.directory.offenders, self._checkpoint(), error.particle)
         try:
             last = self.directory.last_good()
             words += (
-                f"The last good checkpoint is {last}: "
-                f"`sph restart {quoted(last)} --set …` goes on from there with other settings."
+                f"The last valid checkpoint is {last}: "
+                f"`sph restart {quoted(last)} --set …` continues it with other settings."
             )
             self._close("failed", reason=str(error))
-        except FileError as full:  # the failure goes first, whatever the disk bears
+        except FileError as full:  # the numerical failure is reported even if the disk is full
             words += f"\nThe end of the run could not be recorded: {first_line(str(full))}."
         return NumericalError(f"{error}\n{words}", error.particle)
 
@@ -231,13 +209,13 @@ class Runner:
             self._write_checkpoint()
         self._close("stopped", reason=name)
         raise Stopped(
-            f"stopped by {name} at t = {simulation.time:.6g}, step {simulation.step}, with "
+            f"stopped by {name} at t = {simulation.time:.6g}, step {simulation.step}; wrote "
             f"{self.directory.checkpoint_path(self.number - 1)}.\n"
-            f"`sph restart {quoted(self.directory.path)}` goes on from there."
+            f"`sph restart {quoted(self.directory.path)}` continues the run."
         )
 
     def _record(self) -> None:
-        """One row of the history: the state now, and the step that the criteria allow from it."""
+        """Add a row to the history: the present state, and the next step allowed."""
         simulation, totals, limit = self.simulation, self.simulation.totals, self.simulation.limit
         row = {
             "step": simulation.step,
@@ -260,13 +238,13 @@ class Runner:
         }
         momentum = zip("xyz", totals.momentum.tolist(), strict=False)
         row |= {f"momentum_{axis}": component for axis, component in momentum}
-        row |= _of_the_scene(simulation)
+        row |= simulation.columns()
         with simulation.clock.phase("diagnostics"):
             row |= self.config.problem.diagnostics(simulation.particles)
         self.history.append(row)
 
     def _write_checkpoint(self) -> None:
-        """Write the state, after the history up to it."""
+        """Flush the history, then write the checkpoint."""
         simulation = self.simulation
         path = self.directory.checkpoint_path(self.number)
         with simulation.clock.phase("output"):
@@ -290,7 +268,7 @@ class Runner:
         )
         self.directory.write_summary(result)
         named = self.config.report.reference
-        if named and status == "done":  # the summary is kept if the reference has gone
+        if named and status == "done":  # the summary is already written, if this fails
             fine = reference.Reference(Path(named))
             where = str(self.directory.path)
             result["errors"] = reference.errors_against(self._checkpoint(), fine, where)

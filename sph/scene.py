@@ -1,4 +1,4 @@
-"""A scene: what the configuration asks for, and nothing else, in the form the passes take."""
+"""A scene: the parts and models that a configuration selects, in the form the engine uses."""
 
 import math
 from dataclasses import dataclass
@@ -6,26 +6,27 @@ from functools import cached_property
 
 import numpy as np
 
-from sph import kernels, schemes
+from sph import parts, registry
 from sph.config import Config
 from sph.domain import Domain
 from sph.errors import ConfigError
+from sph.formulations import Formulation
 from sph.integrators.step_size import Bounds
-from sph.passes import Models
-from sph.passes.smoothing import Converged, FixedPasses
-from sph.passes.weighting import ByMass, ByNumber
+from sph.part import STAGES, Part, Pass
 from sph.problems.base import InitialState
-from sph.viscosity import balsara
-
-# Relative tolerance of the converged support: round-off of the density sum is some 1e-14.
-TOLERANCE = 1e-10
+from sph.state import Field
 
 
 @dataclass(frozen=True)
 class Scene:
-    """The compiled-in choices of a configuration."""
+    """The models and properties of a configuration that determine the compiled code."""
 
     config: Config
+
+    @property
+    def physics(self):
+        """The table [physics]."""
+        return self.config.physics
 
     @property
     def dimension(self) -> int:
@@ -37,118 +38,87 @@ class Scene:
 
     @cached_property
     def eos(self):
-        return self.config.physics.eos_model()
+        return self.physics.eos_model()
 
     @cached_property
-    def viscosity(self):
-        return self.config.physics.viscosity_model()
-
-    @property
-    def evolves_alpha(self) -> bool:
-        return self.viscosity.evolves
-
-    @property
-    def finds_shocks(self) -> bool:
-        """Whether alpha follows from gradients of velocity and acceleration."""
-        return getattr(self.viscosity, "finds_shocks", False)
-
-    @property
-    def conducts(self) -> bool:
-        return self.config.physics.conductivity is not None
+    def parts(self) -> tuple[Part, ...]:
+        """The optional physics that the scene has."""
+        asked = (kind.of(self) for kind in parts.classes(self.physics.formulation))
+        return tuple(part for part in asked if part is not None)
 
     @cached_property
-    def external(self):
-        """The external field, a model of `sph.external`, or None."""
-        return self.config.physics.external_model()
+    def formulation(self) -> Formulation:
+        return registry.part_class("sph.formulations", self.physics.formulation).of(self)
 
     @cached_property
-    def heating(self):
-        """The source of internal energy, a model of `sph.heating`, or None."""
-        return self.config.physics.heating_model()
+    def all_parts(self) -> tuple[Part, ...]:
+        """The formulation, then the other parts."""
+        return (self.formulation, *self.parts)
 
-    @property
-    def finds_contacts(self) -> bool:
-        """Whether conductivity is switched by the Laplacian of the energy."""
-        return self.conducts and self.models.conductivity.switched
+    @cached_property
+    def fields(self) -> tuple[Field, ...]:
+        """Every array of the state."""
+        return tuple(field for part in self.all_parts for field in part.fields)
 
-    @property
-    def sums_pressure(self) -> bool:
-        return schemes.sums_pressure(self.models.scheme)
+    @cached_property
+    def passes(self) -> tuple[Pass, ...]:
+        """The passes of a step, in their order."""
+        found = [one for part in self.all_parts for one in part.passes]
+        return tuple(sorted(found, key=lambda one: STAGES.index(one.stage)))
 
     @cached_property
     def keeps_momentum(self) -> np.ndarray:
-        """(D,) 1.0 for axes along which total momentum is conserved: no wall, no field."""
-        free = [kind != "mirror" and self.external is None for kind in self.domain.boundaries]
-        return np.array(free, dtype=float)
+        """(D,) 1.0 for axes along which momentum is conserved (no wall, no field), else 0.0."""
+        kept = all(part.keeps_momentum for part in self.all_parts)
+        return np.array([kept and kind != "mirror" for kind in self.domain.boundaries], dtype=float)
+
+    @cached_property
+    def adds_energy(self) -> bool:
+        """Whether a part adds energy, which does not count as energy drift."""
+        return any(part.adds_energy for part in self.all_parts)
+
+    @cached_property
+    def columns(self) -> tuple[str, ...]:
+        """The columns of the history that not every scene has."""
+        found = ["held_supports"] * (self.max_support < math.inf)
+        found += ["volume_ratio"] * self.is_filled
+        found += [name for part in self.all_parts for name in part.columns]
+        return (*found, *["energy_added"] * self.adds_energy)
 
     @cached_property
     def is_filled(self) -> bool:
-        """Whether gas fills a box without open sides, so that sum m/rho is to be its volume."""
+        """Whether gas fills a box without open sides, so that sum m/rho must equal its volume."""
         return self.config.problem.fills_box(self.eos) and "open" not in self.domain.boundaries
 
     @property
     def max_support(self) -> float:
-        """Where supports are held; inf where a closed axis ends them, which is an error."""
+        """Upper limit of support radii; inf unless all axes are open."""
         if any(boundary != "open" for boundary in self.domain.boundaries):
             return math.inf
-        return self.config.physics.max_support * self.domain.largest_side
-
-    @property
-    def bounds_acceleration(self) -> bool:
-        """Whether |a| bounds the step: a field, or heavy gas beside light, sends no signal."""
-        return self.external is not None or self.config.physics.density == "number"
+        return self.physics.max_support * self.domain.largest_side
 
     @cached_property
     def step_bounds(self) -> Bounds:
-        """What bounds the time step, of what the configuration sets."""
-        physics = self.config.physics
+        """Limits on the time step from the configuration."""
+        physics = self.physics
+        held, criterion = physics.C, "signal_speed"
+        for part in self.parts:
+            most, by = part.largest_courant()
+            if most < held:
+                held, criterion = most, by
         return Bounds(
-            physics.C, physics.energy_limit, self.bounds_acceleration, self.config.time.end,
-            self.viscosity.largest(), getattr(self.models.conductivity, "strength", 0.0),
-        )  # fmt: skip
-
-    @property
-    def needs_curl(self) -> bool:
-        return self.config.physics.balsara and self.dimension > 1
-
-    @property
-    def needs_divergence(self) -> bool:
-        return self.config.physics.balsara or self.evolves_alpha
-
-    @cached_property
-    def models(self) -> Models:
-        """The models of the density and rate passes."""
-        passes = self.config.physics.density_passes
-        if passes == "converged":
-            return self.starting_models
-        return self._models(FixedPasses(passes, TOLERANCE))
-
-    @cached_property
-    def starting_models(self) -> Models:
-        """The same, but with converged supports: what a run begins with."""
-        return self._models(Converged(TOLERANCE))
-
-    def _models(self, smoothing) -> Models:
-        physics = self.config.physics
-        kernel = physics.kernel_model()
-        return Models(
-            scheme=schemes.make(physics.scheme),
-            kernel=kernel,
-            smoothing=smoothing,
-            weighting=ByNumber() if physics.density == "number" else ByMass(),
-            eos=self.eos,
-            viscosity=self.viscosity,
-            conductivity=physics.conductivity_model(),
-            balsara=balsara.Balsara() if physics.balsara else None,
-            support_ratio=kernels.support_ratio(kernel, self.dimension),
-            eta=float(physics.eta),
-            max_support=self.max_support,
+            held,
+            criterion,
+            physics.energy_limit,
+            any(part.bounds_acceleration for part in self.all_parts),
+            self.config.time.end,
         )
 
     def initial_state(self) -> InitialState:
-        """The problem's particles. Raises ConfigError for numbers too extreme to place any.
+        """Return the problem's particles.
 
-        Problems square lengths and count lattice cells before there is a particle to check.
+        Raises ConfigError for numbers so extreme that placement fails: problems square lengths and
+        count lattice cells before any particle can be checked.
         """
         problem = self.config.problem
         try:
@@ -157,46 +127,25 @@ class Scene:
         except (ArithmeticError, ValueError) as error:
             raise ConfigError(
                 f"problem.name = {problem.name}: particles cannot be placed with these settings "
-                f"({error}).\nTry: numbers in [problem] that are nearer to 1, and sides of "
-                "problem.domain of similar length."
+                f"({error}).\nTry: numbers in [problem] closer to 1, and sides of problem.domain "
+                "of similar length."
             ) from error
 
-    def parts(self) -> tuple[list[str], list[str]]:
-        """What is compiled in, and what was left out and why, in words."""
-        physics = self.config.physics
-        kernel = self.models.kernel
-        name = type(kernel).__module__.rsplit(".", 1)[-1]
-        flattened = ", gradient flattened" if getattr(kernel, "flattened", False) else ""
-        inside = [
-            f"{self.dimension}-D, {len(self.domain.images.sign)} image(s) of the box",
-            f"scheme {physics.scheme}, kernel {name}{flattened}",
-            f"density by {physics.density}",
-            f"equation of state {type(self.eos).__module__.rsplit('.', 1)[-1]}",
-            "supports converged to 1e-10"
-            if physics.density_passes == "converged"
-            else f"{physics.density_passes} density pass(es)",
-        ]
+    def described(self) -> tuple[list[str], list[str]]:
+        """Return descriptions of the parts that are compiled, and of those left out and why."""
+        inside = [f"{self.dimension}-D, {len(self.domain.images.sign)} image(s) of the box"]
         outside = []
-
-        def part(there: bool, what: str, why_not: str):
-            if there:
-                inside.append(what)
-            else:
-                outside.append(f"{what}: {why_not}")
-
-        part(self.evolves_alpha, "equation for alpha", "alpha is one number")
-        part(self.finds_shocks, "gradients of velocity", "no switch asks for them")
-        part(self.sums_pressure, "sum of the pressure", f"{physics.scheme} takes it from density")
-        part(self.conducts, "artificial conductivity", "physics.conductivity is not given")
-        part(self.finds_contacts, "switch of conductivity", "no conductivity asks for it")
-        part(self.external is not None, "external field", "physics.external is not given")
-        part(self.heating is not None, "heating", "physics.heating is not given")
-        part(physics.balsara, "Balsara factor", "physics.balsara = false")
-        part(self.needs_divergence, "divergence of velocity", "neither Balsara nor alpha needs it")
-        part(
-            self.needs_curl,
-            "curl of velocity",
-            "no curl in 1-D" if self.dimension == 1 else "no Balsara factor asks for it",
-        )
-        part(physics.energy_limit, "time step limit u/|du/dt|", "physics.energy_limit = false")
+        for part in self.all_parts:
+            there, left_out = part.described()
+            inside += there
+            outside += [f"{what}: {why}" for what, why in left_out]
+        there = {type(part) for part in self.parts}
+        for kind in parts.classes(self.physics.formulation):
+            if kind not in there:
+                outside.append(f"{kind.title}: physics.{kind.keys[0].name} is not given")
+        limit = "time step limit u/|du/dt|"
+        if self.physics.energy_limit:
+            inside.append(limit)
+        else:
+            outside.append(f"{limit}: physics.energy_limit = false")
         return inside, outside

@@ -1,10 +1,10 @@
-"""Paths in commands that a message tells the user to run."""
+"""Quoting of paths in commands that a message suggests."""
 
 import shlex
 from pathlib import Path
 
 
 def quoted(path: str | Path) -> str:
-    """`path` as one word of a shell, which no command takes for an option."""
+    """Return `path` quoted as one shell word that no command mistakes for an option."""
     text = str(path)
     return shlex.quote(f"./{text}" if text.startswith("-") else text)

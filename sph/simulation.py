@@ -1,37 +1,35 @@
-"""The simulation: steps 1-9 of the seed, in its order, on whatever the scene has."""
+"""The simulation: the loop over steps. The physics is that of the scene's parts."""
 
 import numpy as np
 from numba.core.registry import cpu_target
 
 from sph import faults, passes, resolution, totals
-from sph.clock import Clock
+from sph.clock import STARTING, Clock
 from sph.integrators import leapfrog, step_size
 from sph.neighbours.order import number_of_blocks
 from sph.neighbours.search import Origin, Search
-from sph.particles import Particles
-from sph.passes import contacts, density, nearest, rates, shocks
+from sph.part import Pass
+from sph.passes import nearest
 from sph.scene import Scene
+from sph.state import State
 from sph.threads import Team
 from sph.watchdog import Watchdog
 
-# Each widening lists to at least the radius that was asked for, which grows by 2 at the most.
+# Each widening extends lists at least to the requested radius, which grows at most by a factor 2.
 MAX_WIDENINGS = 60
-
-# Arrays that a step fills before it reads them: a new order need not carry them along.
-NEW_EACH_STEP = ("acceleration", "energy_rate", "alpha_rate", "density", "omega", "pressure")
 
 
 class Simulation:
-    """Particles and the means to move them on.
+    """The state of a run and the methods that advance it.
 
-    Attributes of use to others: particles, time, step (steps taken), limit (the coming step and
-    what sets it), totals, energy_drift, energy_added, energy_injected, scene, search.origin,
-    clock, watchdog.
+    Public attributes: particles, time, step (number of steps), limit (the next step and its
+    criterion), totals, energy_drift, energy_added, energy_injected, scene, search.origin, clock,
+    watchdog.
     """
 
-    def __init__(self, scene: Scene, particles: Particles, threads: int, clock: Clock):
-        with clock.phase("start of Numba"):
-            # its tables are filled on first use; here, so that no phase of a step pays for it
+    def __init__(self, scene: Scene, particles: State, threads: int, clock: Clock):
+        with clock.phase(STARTING):
+            # Numba fills its tables on first use; done here, so that no other phase is charged
             cpu_target.target_context.refresh()
         self.scene = scene
         self.particles = particles
@@ -40,187 +38,170 @@ class Simulation:
         self.search = Search(scene.domain, self.team)
         self.time = 0.0
         self.step = 0
-        self.steps_here = 0  # of this session, which a restart begins anew
+        self.steps_here = 0  # since the start or the last restart
         self.list_builds = 0
-        self.held_supports = 0  # particles too lonely for a support within physics.max_support
+        self.held_supports = 0  # number of particles whose support is limited by max_support
         self.limit = None
         self.totals = None
         self.baseline = None  # of the energy drift: set at the start, or by `go_on_from`
         self.energy_drift = 0.0
-        self.energy_added = 0.0  # by heating, since the run began
+        self.energy_added = 0.0  # by sources, since the run began
         self.energy_injected = 0.0  # to keep internal energies positive, since the run began
         self.watchdog = Watchdog(scene)
-        n, blocks = particles.number, number_of_blocks(particles.number)
-        if not scene.sums_pressure:
-            particles.pressure = None
-        elif particles.pressure is None:  # a start, or a restart that has changed the scheme
-            particles.pressure = particles.pressure_by(scene.eos)
-        if not scene.evolves_alpha or scene.finds_shocks:
-            particles.alpha_rate = None
-        elif particles.alpha_rate is None:  # a restart that has changed the switch
-            particles.alpha_rate = np.zeros(n)
-        self._dim = (0,) * scene.dimension
-        self._support = np.zeros(n)
-        self._velocity = np.empty_like(particles.velocity)  # full-step predictions (eqs 4-6)
-        self._energy = np.empty(n)
-        self._alpha = None if particles.alpha_rate is None else np.empty(n)
-        self._pressure_term = np.empty(n)
-        self._energy_shift = np.empty(n) if scene.sums_pressure else None
-        self._sound_speed = np.empty(n)
-        self._signal_speed = np.empty(n)
-        self._wanted = np.empty(blocks)
-        self._shares = np.empty(n) if scene.finds_contacts else None
-        self._div_v = np.empty(n) if scene.needs_divergence else None
-        self._curl_v = np.empty(n) if scene.needs_curl else None
-        self._balsara = np.empty(n) if scene.config.physics.balsara else None
+        missing = particles.declare(scene.fields)
+        for part in scene.all_parts:
+            part.remake(particles, missing)
+        self.evolved = tuple(one for part in scene.all_parts for one in part.evolved)
+        self._carried = carried(scene)
+        self._reflected = [
+            field for field in scene.fields if field.rank and field.name in self._carried
+            and field.name != "position"
+        ]  # fmt: skip
+        self._sweep = passes.Sweep(particles, self.team, number_of_blocks(particles.number))
 
     @classmethod
     def start(cls, scene: Scene, threads: int, clock: Clock) -> "Simulation":
-        """From the problem's initial state, ready for the first step. Raises NumericalError."""
+        """Return a simulation ready for its first step. Raises NumericalError."""
         self = cls.of_problem(scene, threads, clock)
         self.begin()
         return self
 
     @classmethod
     def of_problem(cls, scene: Scene, threads: int, clock: Clock) -> "Simulation":
-        """The problem's initial state, of which nothing has been computed yet."""
+        """Return a simulation with the problem's initial state, before `begin`."""
         with clock.phase("initial state"):
-            initial = scene.initial_state()
-            alpha = float(scene.viscosity.start()) if scene.evolves_alpha else None
-            particles = Particles.at_start(*initial, alpha=alpha)
+            particles = State.at_start(scene.fields, *scene.initial_state())
+            for part in scene.all_parts:
+                part.start(particles)
         return cls(scene, particles, threads, clock)
 
     def begin(self) -> None:
-        """Converged supports, rates, and the first step. Raises NumericalError."""
+        """Compute converged supports, rates, and the first step size. Raises NumericalError."""
         self.watchdog.check_range(self)
         resolution.check_extent(self)
-        self._keep_predictions()
+        leapfrog.keep(self.particles, self.evolved)
         self._build_lists(dt=0.0, guess=True)
-        self._density(self.scene.starting_models)
-        resolution.check(self)
-        self._rates(self.scene.starting_models)
+        self._sweep.models = self.scene.formulation.starting_models
+        for one in self.scene.passes:
+            if one.at_start:
+                self._make(one)
+            if one.widens:
+                resolution.check(self)
+        self._sweep.models = self.scene.formulation.models
         self._measure(past=None)
 
     @classmethod
     def resume(
-        cls, scene: Scene, particles: Particles, time: float, step: int, next_step: float,
-        origin: Origin, threads: int, clock: Clock,
+        cls, scene: Scene, particles: State, time: float, step: int, next_step: float,
+        origin: Origin, threads: int, clock: Clock, budget: totals.Budget | None = None,
     ) -> "Simulation":  # fmt: skip
-        """From a checkpoint, to go on bit for bit as if there had been no stop."""
+        """Return a simulation that continues a checkpoint bit for bit.
+
+        budget: the energy budget of the checkpoint; None starts a new budget.
+        """
         self = cls(scene, particles, threads, clock)
         self.time, self.step = time, step
         self.limit = step_size.StepLimit(next_step, 0, "checkpoint")
         with clock.phase("lists"):
             self.search.build(origin, particles.id)
-        self.totals = totals.of(particles, scene.external, scene.keeps_momentum)
-        self.go_on_from(totals.Baseline.at(self.totals, 0.0))
+        self._sweep.models = scene.formulation.models
+        self.totals = totals.of(particles, scene.all_parts, scene.keeps_momentum)
+        anew = totals.Budget(0.0, 0.0, totals.Baseline.at(self.totals, 0.0))
+        self.go_on_from(anew if budget is None else budget)
         return self
 
-    def go_on_from(self, baseline: totals.Baseline) -> None:
-        """Measure the energy drift from `baseline`."""
-        self.baseline = baseline
-        self.energy_drift = baseline.drift(self.totals, self.energy_added)
+    @property
+    def budget(self) -> totals.Budget:
+        """The energy budget that a restart continues."""
+        baseline = self.baseline or totals.Baseline(0.0, 0.0)  # of a run that failed at its start
+        return totals.Budget(self.energy_injected, self.energy_added, baseline)
+
+    def go_on_from(self, budget: totals.Budget) -> None:
+        """Continue the counts of energy in `budget`, and measure energy drift from its baseline."""
+        self.energy_injected, self.energy_added, self.baseline = budget
+        self.energy_drift = self.baseline.drift(self.totals, self.energy_added)
 
     def advance(self, until: float) -> None:
-        """One step (steps 1-9 of the seed), cut where it would pass `until`.
+        """Take one step (steps 1-9 of docs/equations.md), cut to end at `until` at the latest.
 
-        Raises NumericalError where the new state means nothing.
+        Raises NumericalError if the new state is unphysical.
         """
         allowed = self.limit.dt
         dt, landing = allowed, False
         # a remainder of a billionth of a step is rounding, not a step
         if self.time + dt * (1 + 1e-9) >= until:
             dt, landing = until - self.time, True
-        p = self.particles
+        p, sweep = self.particles, self._sweep
+        sweep.dt = dt
         with self.clock.phase("predict, correct"):
-            self._heat(dt / 2)
-            leapfrog.predict(dt, p.position, p.velocity, p.acceleration, self._velocity)
-            self.energy_injected += leapfrog.predict_energy(
-                dt, p.internal_energy, p.energy_rate, p.mass, self._energy
-            )
-            if self.scene.heating is not None:
-                self._energy = self.scene.heating.heated(self._energy, dt / 2)
-            if p.alpha_rate is not None:
-                leapfrog.predict_scalar(dt, p.alpha, p.alpha_rate, self._alpha)
+            self._split(dt / 2)
+            self.energy_injected += leapfrog.predict(p, self.evolved, dt)
+            for part in self.scene.all_parts:
+                part.split_predicted(p, dt / 2)
             stale = self.search.stale(p.position, p.support)
         if stale:
             self._build_lists(dt)
-        self._density(self.scene.models)
-        if self.scene.finds_shocks:
-            self._find_shocks(dt)
-        self._rates(self.scene.models)
+        for one in self.scene.passes:
+            self._make(one)
         with self.clock.phase("predict, correct"):
-            leapfrog.correct(dt, p.velocity, p.acceleration)
-            self.energy_injected += leapfrog.correct_energy(
-                dt, p.internal_energy, p.energy_rate, p.mass
-            )
-            self._heat(dt / 2)
-            if p.alpha_rate is not None:
-                leapfrog.correct(dt, p.alpha, p.alpha_rate)
+            self.energy_injected += leapfrog.correct(p, self.evolved, dt)
+            self._split(dt / 2)
         self.step += 1
         self.steps_here += 1
         self.time = until if landing else self.time + dt
-        self._measure(step_size.Past(dt, allowed, self._support))
+        self._measure(step_size.Past(dt, allowed))
 
     @property
     def volume_ratio(self) -> float | None:
-        """Sum of m/rho over the volume of the box, None where gas does not fill a closed box."""
+        """Sum of m/rho over the volume of the box; None unless gas fills a closed box."""
         return self.totals.volume / self.scene.domain.volume if self.scene.is_filled else None
 
     def nearest(self) -> np.ndarray:
-        """(N,) distance of each particle to its nearest neighbour, in particle spacings.
+        """Return the distance (N,) of each particle to its nearest neighbour, in spacings.
 
-        inf where no neighbour lies within the support.
+        inf if there is no neighbour within the support radius.
         """
         p = self.particles
         found = np.empty(p.number)
-        self.team.run(
-            nearest.nearest, self._wanted.size, self._dim, self._neighbours(), p.position,
-            p.support, p.mass, p.density, found,
-        )  # fmt: skip
+        self._sweep.neighbours = self._neighbours()
+        self._sweep.run(nearest.nearest, None, p.position, p.support, p.mass, p.density, found)
         return found
+
+    def columns(self) -> dict[str, float]:
+        """Return the columns of the history that only some scenes have (`Scene.columns`)."""
+        scene, found = self.scene, dict(self.totals.energies)
+        if scene.max_support < np.inf:
+            found["held_supports"] = self.held_supports
+        if scene.is_filled:
+            found["volume_ratio"] = self.volume_ratio
+        if scene.adds_energy:
+            found["energy_added"] = self.energy_added
+        for part in scene.all_parts:
+            found |= part.sums(self.particles)
+        return {name: found[name] for name in scene.columns}
 
     def close(self) -> None:
         self.team.close()
 
     # --- the parts of a step ---
 
-    def _keep_predictions(self) -> None:
-        """At the start the predicted values are the values themselves."""
-        p = self.particles
-        self._velocity[:] = p.velocity
-        self._energy[:] = p.internal_energy
-        if p.alpha_rate is not None:
-            self._alpha[:] = p.alpha
-
     def _build_lists(self, dt: float, guess: bool = False) -> None:
-        """Order the particles anew and list their candidates."""
+        """Reorder the particles and build the candidate lists."""
         p = self.particles
         self.list_builds += 1
         with self.clock.phase("order"):
             self._bring_inside()
-            order = self.search.order(p.position, p.id)
-            kept = ("acceleration",) if self.scene.finds_shocks else ()
-            for name, array in p.arrays().items():
-                if name in kept or name not in NEW_EACH_STEP:
-                    setattr(p, name, np.ascontiguousarray(array[..., order]))
-            self._velocity = np.ascontiguousarray(self._velocity[:, order])
-            self._energy = self._energy[order]
-            if p.alpha_rate is not None:
-                self._alpha = self._alpha[order]
+            p.reorder(self.search.order(p.position, p.id), self._carried)
         with self.clock.phase("lists"):
             if guess:
-                models = self.scene.models
+                models = self.scene.formulation.models
                 p.support = self.search.guess(p.position, models.support_ratio * models.eta)
-            skin = self.search.skin_for(self._velocity, p.support, dt)
+            skin = self.search.skin_for(p.predicted_velocity, p.support, dt)
             self.search.build(Origin(p.position.copy(), p.support.copy(), skin), p.id)
 
     def _bring_inside(self) -> None:
         p = self.particles
-        vectors = (p.velocity, self._velocity)
-        if self.scene.finds_shocks:  # the last step's, whose gradient this step needs
-            vectors += (p.acceleration,)
-        self.scene.domain.bring_inside(p.position, vectors)
+        self.scene.domain.bring_inside(p.position, [getattr(p, f.name) for f in self._reflected])
 
     def _neighbours(self) -> passes.Neighbours:
         search = self.search
@@ -228,98 +209,57 @@ class Simulation:
             search.lists, search.images, search.origin.support, search.reach_factor
         )
 
-    def _gas(self) -> passes.Gas:
-        p = self.particles
-        return passes.Gas(p.position, self._velocity, p.mass, self._energy, p.support)
-
-    def _fields(self, support) -> passes.Fields:
-        p = self.particles
-        return passes.Fields(support, p.density, p.omega, self._pressure_term, self._sound_speed)
-
-    def _summed(self) -> passes.SummedPressure | None:
-        if self._energy_shift is None:
-            return None
-        return passes.SummedPressure(self.particles.pressure, self._energy_shift)
-
-    def _density(self, models) -> None:
-        """Steps 2-4 and 6: density, support, Omega, div and curl, EOS, Balsara, alpha's rate."""
-        p = self.particles
-        self._wanted.fill(1.0)
-        for _ in range(MAX_WIDENINGS):
-            with self.clock.phase("density"):
-                self.team.run(
-                    density.density, self._wanted.size, self._dim, models, self._neighbours(),
-                    self._gas(), self._alpha, self._fields(self._support),
-                    self._summed(), self._div_v, self._curl_v, self._balsara, p.alpha_rate,
-                    self._wanted,
-                )  # fmt: skip
-            if not self._wanted.max() > 0.0:
-                p.support, self._support = self._support, p.support
-                self._check_found(models)
+    def _make(self, one: Pass) -> None:
+        """Run a pass, and repeat it with wider lists as long as it requests them."""
+        sweep, p = self._sweep, self.particles
+        sweep.wanted.fill(1.0)
+        for _ in range(MAX_WIDENINGS if one.widens else 1):
+            sweep.neighbours = self._neighbours()
+            with self.clock.phase(one.phase):
+                one.run(sweep)
+            if not one.widens:
+                return
+            if not sweep.wanted.max() > 0.0:
+                self._check_found()
                 return
             with self.clock.phase("lists"):
                 self._bring_inside()
-                self.search.widen(p.position, self._wanted, p.id)
-        raise faults.starved(self, int(np.argmax(self._wanted)))
+                self.search.widen(p.position, sweep.wanted, p.id)
+        raise faults.starved(self, int(np.argmax(sweep.wanted)))
 
-    def _check_found(self, models) -> None:
-        """Count the supports that are held; raise where one has no root however small it is."""
-        p = self.particles
-        if models.max_support < np.inf:
-            self.held_supports = int(np.count_nonzero(p.support == models.max_support))
+    def _check_found(self) -> None:
+        """Count supports limited by max_support. Raise NumericalError if one was not found."""
+        p, most = self.particles, self.scene.max_support
+        if most < np.inf:
+            self.held_supports = int(np.count_nonzero(p.support == most))
         if p.density.min() < 0.0:
             raise faults.crowded(self)
 
-    def _find_shocks(self, dt: float) -> None:
-        """Alpha at the end of the step dt, from gradients of velocity and acceleration."""
-        p = self.particles
-        with self.clock.phase("viscosity"):
-            self.team.run(
-                shocks.shocks, self._wanted.size, self._dim, self.scene.models, self._neighbours(),
-                self._gas(), p.alpha, self._fields(p.support), self._div_v, p.acceleration, dt,
-            )  # fmt: skip
-
-    def _find_contacts(self, models) -> None:
-        """What part of the conductivity acts on each particle."""
-        with self.clock.phase("conductivity"):
-            self.team.run(
-                contacts.contacts, self._wanted.size, self._dim, models, self._neighbours(),
-                self._gas(), self._shares, self._fields(self.particles.support),
-            )  # fmt: skip
-
-    def _rates(self, models) -> None:
-        """Step 5: acceleration, rate of energy, and each particle's signal speed."""
-        p = self.particles
-        if self._shares is not None:
-            self._find_contacts(models)
-        with self.clock.phase("rates"):
-            self.team.run(
-                rates.rates, self._wanted.size, self._dim, models, self._neighbours(),
-                self._gas(), p.alpha if self.scene.finds_shocks else self._alpha,
-                self._fields(p.support), self._summed(),
-                self._balsara, self._energy if self.scene.conducts else None, self._shares,
-                p.acceleration, p.energy_rate, self._signal_speed,
-            )  # fmt: skip
-            if self.scene.external is not None:
-                p.acceleration += self.scene.external.acceleration(p.position)
-
-    def _heat(self, dt: float) -> None:
-        """What heating does to the internal energies in dt, and its sum over the run."""
-        if self.scene.heating is None:
-            return
-        p = self.particles
-        before = p.internal_energy
-        p.internal_energy = self.scene.heating.heated(before, dt)
-        self.energy_added += float(p.mass @ (p.internal_energy - before))
+    def _split(self, dt: float) -> None:
+        """Apply the parts that are split from the flow for half a step."""
+        for part in self.scene.all_parts:
+            self.energy_added += part.split(self.particles, dt)
 
     def _measure(self, past: step_size.Past | None) -> None:
-        """Step 8, the sums of the history, and whether the state means anything."""
+        """Do step 8: totals, energy drift, the next step, and the watchdog's checks."""
         with self.clock.phase("step size, sums"):
-            self.totals = totals.of(self.particles, self.scene.external, self.scene.keeps_momentum)
+            scene, p = self.scene, self.particles
+            self.totals = totals.of(p, scene.all_parts, scene.keeps_momentum)
             if self.baseline is None:
                 self.baseline = totals.Baseline.at(self.totals, self.energy_added)
             self.energy_drift = self.baseline.drift(self.totals, self.energy_added)
-            bounds, p = self.scene.step_bounds, self.particles
-            limit = step_size.limit(bounds, p, self._signal_speed, self._div_v, past)
-            self.limit = step_size.before_contact(limit, bounds, p, self.scene.domain)
+            limit = step_size.limit(scene.step_bounds, p, scene.all_parts, past)
+            self.limit = step_size.before_contact(limit, scene.step_bounds, p, scene.domain)
             self.watchdog.check(self)
+
+
+def carried(scene: Scene) -> tuple[str, ...]:
+    """Return the fields that must be reordered: those that a step reads before writing."""
+    read: set[str] = set()
+    written: set[str] = set()
+    for one in scene.passes:
+        read |= {name for name in one.reads if name not in written}
+        written |= set(one.writes)
+    return tuple(
+        field.name for field in scene.fields if field.name in read or field.name not in written
+    )

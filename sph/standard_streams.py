@@ -1,4 +1,4 @@
-"""Standard output and error: what cannot be written there is dropped, and never ends a run."""
+"""Standard output and error. Output that cannot be written is dropped, and the run continues."""
 
 import io
 import os
@@ -9,11 +9,11 @@ from sph.errors import FileError
 
 
 class _Dropping(io.FileIO):
-    """A descriptor to write to that drops what cannot be written: full disk, closed pipe."""
+    """A file descriptor whose writes never raise: on a full disk or closed pipe, output is lost."""
 
     def __init__(self, descriptor: int):
         super().__init__(descriptor, "w", closefd=False)
-        self.failure: OSError | None = None  # the first one, but for a reader who has gone
+        self.failure: OSError | None = None  # the first one, other than a closed pipe
 
     def write(self, content) -> int:
         try:
@@ -27,29 +27,30 @@ class _Dropping(io.FileIO):
 
 
 def secure() -> None:
-    """Let no write to stdout or stderr raise, also none of Python itself, NumPy or tqdm.
+    """Replace sys.stdout and sys.stderr by streams whose writes never raise.
 
-    Descriptors 0 to 2 that are closed become /dev/null: else the next file that is opened, a
-    history for instance, would be stdout or stderr, and messages would be written into that file.
+    This covers messages of Python, NumPy and tqdm as well. Descriptors 0 to 2 that are closed are
+    opened on /dev/null: otherwise the next file opened, such as a history, would get one of these
+    numbers, and messages would be written into that file.
     """
     _fill_closed_descriptors()
     for name, descriptor in (("stdout", 1), ("stderr", 2)):
         stream = getattr(sys, name)
-        if stream is None or stream is getattr(sys, f"__{name}__"):  # else a caller's own
+        if stream is None or stream is getattr(sys, f"__{name}__"):  # not one set by a caller
             setattr(sys, name, _dropping(stream, descriptor))
 
 
 def note(text: str) -> None:
-    """A line on stderr, dropped where it cannot be written."""
-    if sys.stderr is not None:  # print() would take stdout in place of None
+    """Write a line to stderr, or drop it if stderr cannot be written."""
+    if sys.stderr is not None:  # print(file=None) would write to stdout
         with suppress(OSError, ValueError):  # ValueError: the stream is closed
             print(text, file=sys.stderr, flush=True)
 
 
 def deliver(text: str) -> None:
-    """Write `text` to stdout where it is all that a command makes. Raises FileError.
+    """Write `text`, a command's whole result, to stdout. Raises FileError if that fails.
 
-    A reader who has gone, as `head` does, has had enough: no error.
+    A reader such as `head` that closes the pipe early is not an error.
     """
     with suppress(BrokenPipeError):
         print(text, end="", flush=True)
@@ -63,7 +64,8 @@ def _dropping(stream: io.TextIOBase | None, descriptor: int) -> io.TextIOWrapper
         with suppress(OSError, ValueError):
             stream.flush()
     encoding = getattr(stream, "encoding", None) or "utf-8"
-    # paths that are not UTF-8 come out as their own bytes; other encodings escape what they lack
+    # UTF-8 writes the original bytes of paths that are not UTF-8; other encodings escape characters
+    # that they do not have
     exact = encoding.lower().replace("-", "") == "utf8"
     return io.TextIOWrapper(
         io.BufferedWriter(_Dropping(descriptor)),

@@ -1,7 +1,4 @@
-"""Signals that ask the program to stop.
-
-A run notes them and acts between two steps. Anything else ends at once, in one line.
-"""
+"""SIGINT (Ctrl-C) and SIGTERM: a run stops after its current step, all else stops at once."""
 
 import os
 import signal
@@ -11,14 +8,14 @@ NUMBERS = (signal.SIGINT, signal.SIGTERM)
 
 
 def name(number: int) -> str:
-    """The signal in a user's words."""
+    """Return the name of a signal for messages: "Ctrl-C" or "SIGTERM"."""
     return "Ctrl-C" if number == signal.SIGINT else signal.Signals(number).name
 
 
 def end_at_once() -> None:
-    """From now on SIGINT and SIGTERM end the process: one line, no traceback, by that very signal.
+    """Install handlers that print one line and end the process by the signal received.
 
-    A signal that the caller has set to be ignored, as nohup and shells do, stays so.
+    There is no traceback. A signal that the parent process ignores, as under nohup, stays ignored.
     """
     for number in NUMBERS:
         if signal.getsignal(number) is not signal.SIG_IGN:
@@ -29,11 +26,11 @@ def _end(number, _frame):
     _say(f"sph: ended by {name(number)}")
     signal.signal(number, signal.SIG_DFL)
     signal.raise_signal(number)
-    os._exit(128 + number)  # the first process of a container is not ended by a signal
+    os._exit(128 + number)  # reached as process 1 of a container, which signals do not end
 
 
 def _say(text: str) -> None:
-    """Write a line to stderr, not through sys.stderr, which may be in the middle of a write."""
+    """Write a line to descriptor 2, since sys.stderr may be in the middle of a write."""
     with suppress(OSError):
         beginning = "\n" if os.isatty(2) else ""  # a terminal shows "^C"
         os.write(2, f"{beginning}{text}\n".encode())
@@ -41,24 +38,24 @@ def _say(text: str) -> None:
 
 @contextmanager
 def stop_signals(second=None):
-    """A list that holds the name of the first SIGINT or SIGTERM once one has come.
+    """Yield a list to which the name of the first SIGINT or SIGTERM is added.
 
-    second: the handler of all later ones, for those who cannot wait for the end of a step; they
-    act as they would without us if None.
+    second: handler of later signals, for users who do not wait for the end of the step. If None,
+    later signals are handled as before.
     """
-    came: list[str] = []
+    received: list[str] = []
 
     def note(number, _frame):
-        came.append(name(number))
+        received.append(name(number))
         for one in NUMBERS:
             signal.signal(one, second or before[one])
-        _say(f"{came[0]}: stopping after this step; again to stop at once")
+        _say(f"{received[0]}: stopping after this step; send it again to stop at once")
 
     before = {number: signal.getsignal(number) for number in NUMBERS}
     for number in NUMBERS:
         signal.signal(number, note)
     try:
-        yield came
+        yield received
     finally:
         for number in NUMBERS:
             signal.signal(number, before[number])

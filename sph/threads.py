@@ -1,38 +1,43 @@
-"""A team of threads that share a pass over blocks.
+"""A team of threads that share a pass over blocks of particles.
 
-Compiled passes release the interpreter's lock, so plain Python threads run them side by side.
-Every particle is written by the one range that holds it, so the split does not show in the result.
+Compiled passes release Python's global interpreter lock, so ordinary threads run them in parallel.
+Each particle is written by exactly one range, so results do not depend on the number of threads.
 """
 
 import itertools
 import os
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
+from typing import Any
 
-# Blocks below which a range is not worth handing to another thread: handing over costs some 50
-# microseconds, and 256 blocks of eight particles are 600 of them in 1-D, 5000 in 3-D.
+# Smallest number of blocks in a range. Starting a range in another thread costs about 50
+# microseconds; a pass over 256 blocks of eight particles takes 600 in 1-D and 5000 in 3-D.
 SMALLEST_RANGE = 256
 
 
 def available_processors() -> int:
-    """Processors that this process may use."""
+    """Return the number of processors that this process may use."""
     if hasattr(os, "sched_getaffinity"):
         return len(os.sched_getaffinity(0))
     return os.cpu_count() or 1
 
 
 class Team:
-    """`threads` threads; with one, everything runs in the caller."""
+    """A pool of `threads` threads. With one thread, calls run in the calling thread."""
 
     def __init__(self, threads: int):
         self.threads = threads
         self._pool = ThreadPoolExecutor(threads, "sph") if threads > 1 else None
 
-    def run(self, function, items: int, *arguments, smallest: int = SMALLEST_RANGE) -> None:
-        """Call function(first, last, *arguments) over ranges that cover [0, items).
+    def run(
+        self, function: Callable[..., None], items: int, *arguments: Any,
+        smallest: int = SMALLEST_RANGE,
+    ) -> None:  # fmt: skip
+        """Call function(first, last, *arguments) for ranges that cover [0, items).
 
         No range is shorter than `smallest` items.
         """
-        # four ranges a thread even out regions that cost more than others
+        # four ranges per thread balance the load where some ranges cost more than others
         ranges = min(4 * self.threads, items // smallest)
         if self._pool is None or ranges < 2:
             function(0, items, *arguments)

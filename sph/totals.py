@@ -1,4 +1,4 @@
-"""Sums and extremes over all particles: what the history records and the watchdog looks at."""
+"""Sums and extremes over all particles, for the history and the watchdog."""
 
 import math
 from typing import NamedTuple
@@ -10,20 +10,25 @@ from sph.compiled import COMPILED
 
 
 class Totals(NamedTuple):
-    """Of one state, in code units."""
+    """Sums and extremes of one state, in code units."""
 
     kinetic_energy: float
-    # the same of velocities relative to the mean one, along the axes that keep momentum
+    # of velocities relative to the mean velocity, along axes that conserve momentum
     kinetic_energy_without_bulk: float
     internal_energy: float
-    potential_energy: float  # in an external field, else 0
+    energies: dict[str, float]  # of parts, by column of the history
     momentum: np.ndarray  # (D,)
     volume: float  # sum m/rho
     min_density: float
     max_density: float
     min_internal_energy: float
     max_internal_energy: float
-    rates: float  # of velocity and energy, all together: finite if each of them is
+    rates: float  # sum of all rates of velocity and energy; not finite if one of them is not
+
+    @property
+    def potential_energy(self) -> float:
+        """All energy that is neither kinetic nor internal."""
+        return sum(self.energies.values(), 0.0)
 
     @property
     def energy(self) -> float:
@@ -31,25 +36,25 @@ class Totals(NamedTuple):
 
     @property
     def energy_without_bulk(self) -> float:
-        """What an energy drift is measured by: bulk motion, however fast, would hide it."""
+        """Energy for the energy drift; fast bulk motion would hide the drift."""
         return self.kinetic_energy_without_bulk + self.internal_energy + self.potential_energy
 
 
 class Baseline(NamedTuple):
-    """The energy that a run began with, without bulk motion, and what its drift is relative to."""
+    """Initial energy without bulk motion, and the scale of the relative energy drift."""
 
     energy: float
     scale: float
 
     @classmethod
     def of(cls, kinetic_without_bulk: float, internal: float, potential: float) -> "Baseline":
-        """From the sums at the start. Potential energy may cancel the others, which then scale."""
+        """Return the baseline of initial sums. The scale excludes cancellation by the potential."""
         energy = kinetic_without_bulk + internal + potential
         return cls(energy, max(abs(energy), kinetic_without_bulk + internal))
 
     @classmethod
     def at(cls, totals: Totals, added: float) -> "Baseline":
-        """As if a run began with these totals, after heating has added so much energy."""
+        """Return the baseline of a run with these totals, less the energy added by sources."""
         return cls.of(
             totals.kinetic_energy_without_bulk,
             totals.internal_energy - added,
@@ -57,25 +62,35 @@ class Baseline(NamedTuple):
         )
 
     def drift(self, totals: Totals, added: float) -> float:
-        """Change of energy since the start, less what heating added, over the scale."""
+        """Return the change of energy since the start, less the energy added, over the scale."""
         change = totals.energy_without_bulk - added - self.energy
         if self.scale > 0.0:
             return float(change / self.scale)
         return math.copysign(math.inf, change) if change else 0.0
 
 
-def of(particles, external, keeps_momentum) -> Totals:
-    """The totals of `particles`; external: a model of `sph.external`, or None.
+class Budget(NamedTuple):
+    """Energies counted since the start of a run, and the baseline of its energy drift."""
 
-    keeps_momentum (D,): 1.0 for axes along which total momentum is conserved, 0.0 for others.
+    injected: float  # to keep internal energies positive
+    added: float  # by sources
+    baseline: Baseline
+
+
+def of(state, parts, keeps_momentum) -> Totals:
+    """Return the totals of a state. parts: parts whose energies belong to the total.
+
+    keeps_momentum: (D,), 1.0 for axes along which momentum is conserved, 0.0 for others.
     """
-    p = particles
+    s = state
     kinetic, relative, internal, *others = _totals(
-        p.mass, p.velocity, p.internal_energy, p.density, p.acceleration, p.energy_rate,
+        s.mass, s.velocity, s.internal_energy, s.density, s.acceleration, s.energy_rate,
         keeps_momentum,
     )  # fmt: skip
-    potential = 0.0 if external is None else float(p.mass @ external.potential(p.position))
-    return Totals(kinetic, relative, internal, potential, *others)
+    energies = {
+        name: float(s.mass @ each) for part in parts for name, each in part.energies(s).items()
+    }
+    return Totals(kinetic, relative, internal, energies, *others)
 
 
 @njit(**COMPILED)
@@ -102,7 +117,7 @@ def _totals(mass, velocity, energy, density, acceleration, energy_rate, keeps_mo
             rates += acceleration[d, i]
         momentum[d] = along
         kinetic += 0.5 * squares
-        # not a difference of two sums, of which nothing is left at a million times the sound speed
+        # not a difference of two sums, which would lose all digits at very large Mach numbers
         bulk = keeps_momentum[d] * along / all_mass
         squares = 0.0
         for i in range(n):

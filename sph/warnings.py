@@ -1,36 +1,37 @@
-"""What a result assumes and a run did not keep: one list of warnings, first in its summary.
+"""Warnings on a finished run whose result is doubtful. They stand first in its summary.
 
-Each kind is one function below, and one section of docs/warnings.md with a scene that gives it.
-A warning says what was found, against what, and what to try.
+Each kind is one function below, and one section of docs/warnings.md with an example. A warning says
+what was found, which limit it exceeds, and what to try.
 """
 
-from collections.abc import Iterator
-from typing import Any, NamedTuple
+from collections.abc import Iterator, Mapping
+from typing import NamedTuple
 
 from sph import resolution
+from sph.summary import Conservation, Nearest, Summary, figure
 
-# The stress suite holds its passing settings to this; more is an error of the time integration.
+# Limit of the stress suite for settings that pass; a larger drift is an error of time integration.
 DRIFT = 1e-3
-# Pairs push each other equally: more is neither round-off nor an error of the integration.
+# Pair forces are equal and opposite: more is neither round-off nor an error of time integration.
 MOMENTUM = 1e-6
-# Shipped scenes keep sum m/rho to 5 % of the box, most of them to 3 %; too few neighbours (eta of
-# 0.85 in 2-D) miss it by 12 %.
+# In shipped configurations sum m/rho is within 5 % of the box's volume, in most within 3 %. With
+# too few neighbours (eta = 0.85 in 2-D) it is wrong by 12 %.
 VOLUME = 0.06
-# Healthy runs end with median distances from .85 (Gresho's vortex, 32^2) to 1.07 (a hexagonal
-# lattice) of the spacing, and particles at random places begin with .54; kernels that pair end
-# below .46 (docs/measurements.md).
+# Median distance to the nearest neighbour, in particle spacings. Runs without pairing end with 0.85
+# (Gresho vortex, 32^2) to 1.07 (hexagonal lattice), and random positions start with 0.54. Runs
+# with pairing end below 0.46 (docs/measurements.md).
 PAIRED = 0.5
 
 
 class Warning(NamedTuple):
-    """A kind, by which reports and documents know it, and a sentence or two for the user."""
+    """A warning: its kind, which names its section in docs/warnings.md, and its text."""
 
     kind: str
     text: str
 
 
-def of_run(simulation, summary: dict[str, Any]) -> list[Warning]:
-    """The warnings of a run, from its last state and what its summary has."""
+def of_run(simulation, summary: Summary) -> list[Warning]:
+    """Return the warnings of a run, from its final state and its summary."""
     problem = simulation.scene.config.problem
     return [
         *_swamped(problem, summary),
@@ -44,30 +45,17 @@ def of_run(simulation, summary: dict[str, Any]) -> list[Warning]:
     ]
 
 
-def kinds(summary: dict[str, Any]) -> list[str]:
-    """The kinds of warning in a summary, none twice; summaries of older versions have none.
+def kinds(summary: Mapping[str, object]) -> list[str]:
+    """Return the kinds of warnings in a summary, each once. Older summaries have no warnings.
 
-    A summary that was read may be damaged: what is no warning there is left out.
+    Entries of a damaged summary that are not warnings are skipped.
     """
     found = summary.get("warnings")
     warned = [one for one in found if isinstance(one, dict)] if isinstance(found, list) else []
     return list(dict.fromkeys(str(one.get("kind")) for one in warned))
 
 
-def figure(summary: dict[str, Any], name: str) -> float | None:
-    """A figure that a problem sets a limit on, as its file names it; None where a run has none.
-
-    NAME of the report or of what was kept, where "energy_drift" is the largest at any step; or
-    "l1.FIELD", the L1 error of a field.
-    """
-    if name.startswith("l1."):
-        fields = (summary["errors"] or {}).get("fields", {})
-        return fields.get(name.removeprefix("l1."), {}).get("L1")
-    named = summary["conservation"] | (summary["report"] or {})
-    return named.get("energy_drift_max" if name == "energy_drift" else name)
-
-
-def _swamped(problem, summary) -> Iterator[Warning]:
+def _swamped(problem, summary: Summary) -> Iterator[Warning]:
     for name, limit in problem.swamped.items():
         value = figure(summary, name)
         if value is not None and not limit.holds(value):
@@ -78,7 +66,7 @@ def _swamped(problem, summary) -> Iterator[Warning]:
             )
 
 
-def _energy(kept) -> Iterator[Warning]:
+def _energy(kept: Conservation) -> Iterator[Warning]:
     drift = kept["energy_drift_max"]
     if not drift <= DRIFT:
         yield Warning(
@@ -88,18 +76,18 @@ def _energy(kept) -> Iterator[Warning]:
         )
 
 
-def _momentum(kept) -> Iterator[Warning]:
+def _momentum(kept: Conservation) -> Iterator[Warning]:
     change = kept["momentum_change"]
     if change is not None and not change <= MOMENTUM:
         yield Warning(
             "momentum",
-            f"total momentum changed by {change:.2g} of sum m(|v| + c), which pairs of particles "
-            f"conserve to round-off: above {MOMENTUM:g} something is wrong. Try another "
-            "physics.scheme, and please report this run.",
+            f"total momentum changed by {change:.2g} of sum m(|v| + c), more than {MOMENTUM:g}. "
+            "Pair forces conserve momentum to round-off, so this is a fault of the program. Try "
+            "another physics.scheme, and please report this run.",
         )
 
 
-def _volume(kept) -> Iterator[Warning]:
+def _volume(kept: Conservation) -> Iterator[Warning]:
     ratio = kept["volume_ratio"]
     if ratio is not None and not abs(ratio - 1.0) <= VOLUME:
         yield Warning(
@@ -116,8 +104,8 @@ def _held(simulation) -> Iterator[Warning]:
         yield Warning(
             "held_supports",
             f"{held} of {simulation.particles.number} particles have too few neighbours: their "
-            f"supports are held at {simulation.scene.max_support:.4g} and their densities are too "
-            "low. Try a larger physics.max_support.",
+            f"support radius is at its upper limit, {simulation.scene.max_support:.4g}, and their "
+            "density is too low. Try a larger physics.max_support.",
         )
 
 
@@ -126,17 +114,18 @@ def _resolution(simulation) -> Iterator[Warning]:
         yield Warning("resolution", text)
 
 
-def _paired(nearest: dict[str, float] | None) -> Iterator[Warning]:
+def _paired(nearest: Nearest | None) -> Iterator[Warning]:
     if nearest and nearest["median"] < PAIRED:
         yield Warning(
             "paired",
-            "particles have paired: the median distance to the nearest neighbour is "
-            f"{nearest['median']:.2g} of the particle spacing, so the run has fewer resolution "
-            "elements than particles. Try a Wendland kernel, or a smaller physics.eta.",
+            "particles form close pairs (pairing instability): the median distance to the nearest "
+            f"neighbour is {nearest['median']:.2g} of the particle spacing, so the resolution is "
+            "lower than the number of particles suggests. Try a Wendland kernel, or a smaller "
+            "physics.eta.",
         )
 
 
-def _limits(problem, summary) -> Iterator[Warning]:
+def _limits(problem, summary: Summary) -> Iterator[Warning]:
     for name, limit in problem.allowed().items():
         value = figure(summary, name)
         if value is None or limit.holds(value) or _is_said(name, problem, summary):
@@ -144,8 +133,8 @@ def _limits(problem, summary) -> Iterator[Warning]:
         yield Warning("limit", _beyond(name, value, limit))
 
 
-def _is_said(name: str, problem, summary) -> bool:
-    """Whether another kind of warning tells of that figure."""
+def _is_said(name: str, problem, summary: Summary) -> bool:
+    """Return whether another kind of warning already reports that number."""
     if name == "energy_drift":
         return any(_energy(summary["conservation"]))
     return name in problem.swamped and not problem.swamped[name].holds(figure(summary, name))

@@ -1,1 +1,1 @@
-"""What a run says of itself: errors, summary, pictures."""
+"""Analysis of runs: errors, summaries, reports and figures."""

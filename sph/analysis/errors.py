@@ -1,15 +1,16 @@
-"""Norms of the difference between a state and its exact solution."""
+"""Errors of a state: norms of its difference from the exact solution."""
 
 import numpy as np
 
 from sph.analysis import truth
 from sph.config import Config
+from sph.summary import AbsoluteNorms, Errors, Norms
 
 FIELDS = ("density", "velocity", "pressure", "internal_energy")
 
 
-def norms(difference, volume) -> dict[str, float]:
-    """Volume-weighted norms of `difference` (N,) or (D, N), of which the length is taken.
+def norms(difference, volume) -> AbsoluteNorms:
+    """Volume-weighted norms of `difference` (N,), or of the length of a vector (D, N).
 
     L1 = sum V |d| / sum V, L2 = sqrt(sum V d^2 / sum V), Linf = max |d|; volume (N,) = m/rho.
     """
@@ -22,32 +23,28 @@ def norms(difference, volume) -> dict[str, float]:
     }
 
 
-def by_field(state: dict, exact: dict, volume, inside) -> dict[str, dict[str, float | None]]:
+def by_field(state: dict, exact: dict, volume, inside) -> dict[str, Norms]:
     """Norms of state - exact of each field over the particles `inside` (N,), volume (N,).
 
-    "relative_L1" is sum V |d| / sum V |exact|, None where the exact field is zero everywhere. That
-    of a velocity depends on the frame of reference: |v| is its size, and not |v| + c_s.
+    "relative_L1" is sum V |d| / sum V |exact|. Of a velocity it depends on the frame of reference:
+    |v| is taken, not |v| + c_s.
     """
-    found = {}
+    found: dict[str, Norms] = {}
     for name in FIELDS:
         if name in exact:
             difference, true = ((state[name] - exact[name]), exact[name])
-            found[name] = norms(difference[..., inside], volume[inside])
+            own = norms(difference[..., inside], volume[inside])
             size = norms(true[..., inside], volume[inside])["L1"]
-            found[name]["relative_L1"] = found[name]["L1"] / size if size > 0.0 else None
+            found[name] = {**own, "relative_L1": own["L1"] / size if size > 0.0 else None}
     return found
 
 
-def against_exact(config: Config, time: float, particles, pressure) -> dict | None:
-    """Norms by field where the exact solution holds, or None: `truth.left_out` says why.
-
-    {"against": words, "region": words, "particles": how many, "fields": {field: {"L1": …, …}}},
-    see `by_field`
-    """
+def against_exact(config: Config, time: float, particles, pressure) -> Errors | None:
+    """Errors by field where the exact solution holds, or None: `truth.left_out` says why."""
     if truth.left_out(config, time, particles.position):
         return None
     problem, eos = config.problem, config.physics.eos_model()
-    exact = problem.exact(eos, time, particles.position)
+    exact = problem.exact(eos, time, particles.position) or {}
     inside, words = truth.region(problem, eos, time, particles.position)
     state = {
         "density": particles.density,

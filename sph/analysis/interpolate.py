@@ -1,13 +1,21 @@
-"""Fields of particles on the pixels of a plane, weighted by the particles' own kernels."""
+"""Fields of particles interpolated by their own kernels: at points, and on the pixels of a plane.
+
+A(x) = sum_j V_j A_j W(x - x_j, H_j) / sum_j V_j W(x - x_j, H_j), V = m/rho, over particles and
+their images (Shepard 1968): a constant field stays constant. NaN where no kernel reaches.
+"""
 
 from typing import NamedTuple
 
 import numpy as np
 from numba import njit
+from scipy.spatial import cKDTree
 
 from sph.compiled import COMPILED
 from sph.domain import Domain
 from sph.kernels import w
+
+# Particles that `at_points` handles at once: some million pairs in 3-D.
+CHUNK = 10_000
 
 
 class Plane(NamedTuple):
@@ -33,16 +41,38 @@ class Plane(NamedTuple):
         return self.low[0], self.high[0], self.low[1], self.high[1]
 
 
-def onto_plane(values: np.ndarray, particles, domain: Domain, kernel, plane: Plane) -> np.ndarray:
-    """Scalar fields `values` (F, N) of the particles at the centres of the pixels, (F, ny, nx).
+def at_points(
+    scalars: np.ndarray, vector: np.ndarray, particles, domain: Domain, kernel, points: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Scalar fields (F, N) and a vector field (D, N) at (D, M) points: (F, M) and (D, M).
 
-    A(x) = sum_j V_j A_j W(x - x_j, H_j) / sum_j V_j W(x - x_j, H_j), V = m/rho, over particles and
-    their images (Shepard 1968): a constant field stays constant. NaN where no kernel reaches.
+    Vectors of images behind a mirror are reflected.
     """
+    D, H, weight = particles.dimension, particles.support, _weight(particles)
+    tree = cKDTree(points.T)
+    low, high = points.min(axis=1), points.max(axis=1)
+    sums = np.zeros((len(scalars) + D + 1, points.shape[1]))
+    for sign, offset in zip(*domain.images_within(H.max()), strict=True):
+        image = sign[:, None] * particles.position + offset[:, None]
+        values = np.vstack([scalars, sign[:, None] * vector, np.ones_like(H)])
+        reaches = (image + H > low[:, None]) & (image - H < high[:, None])
+        near = np.flatnonzero(reaches.all(axis=0))
+        for j in np.array_split(near, len(near) // CHUNK + 1):
+            found = tree.query_ball_point(image[:, j].T, H[j])
+            i = np.concatenate([*map(np.asarray, found), np.zeros(0)]).astype(int)
+            j = np.repeat(j, [len(one) for one in found])
+            q = np.linalg.norm(points[:, i] - image[:, j], axis=0) / H[j]
+            share = weight[j] * kernel.w((0,) * D, q)
+            for total, value in zip(sums, values, strict=True):
+                total += np.bincount(i, share * value[j], total.size)
+    means = _means(sums[:-1], sums[-1])
+    return means[: len(scalars)], means[len(scalars) :]
+
+
+def onto_plane(values: np.ndarray, particles, domain: Domain, kernel, plane: Plane) -> np.ndarray:
+    """Scalar fields `values` (F, N) of the particles at the centres of the pixels, (F, ny, nx)."""
     values = np.ascontiguousarray(values, dtype=np.float64)
-    H = particles.support
-    # The normalisation C of the kernel cancels.
-    weight = particles.mass / (particles.density * H**particles.dimension)
+    H, weight = particles.support, _weight(particles)
     step = (plane.high - plane.low) / np.array(plane.shape)
     first = plane.low + step / 2
     sums = np.zeros((len(values), plane.shape[1], plane.shape[0]))
@@ -56,6 +86,16 @@ def onto_plane(values: np.ndarray, particles, domain: Domain, kernel, plane: Pla
                 kernel, (0,) * particles.dimension, image[:2, near], depth[near], H[near],
                 weight[near], values[:, near], first, step, total, sums,
             )  # fmt: skip
+    return _means(sums, total)
+
+
+def _weight(particles) -> np.ndarray:
+    """(N,) V/H^D, the factor before the kernel, whose normalisation cancels."""
+    return particles.mass / (particles.density * particles.support**particles.dimension)
+
+
+def _means(sums: np.ndarray, total: np.ndarray) -> np.ndarray:
+    """sums (F, …) over the sum of weights (…), NaN where no kernel reaches."""
     with np.errstate(invalid="ignore"):
         return np.where(total > 0.0, sums / total, np.nan)
 

@@ -1,12 +1,12 @@
-"""Errors against a finer run of the same problem, for want of an exact solution."""
+"""Errors against a finer run of the same problem, where no exact solution exists."""
 
 import os
 from bisect import bisect_left
 from pathlib import Path
 
 import numpy as np
-from scipy.spatial import cKDTree
 
+from sph.analysis import interpolate
 from sph.analysis.errors import FIELDS, by_field
 from sph.config import Config
 from sph.domain import Domain
@@ -15,15 +15,14 @@ from sph.output import checkpoint
 from sph.output.checkpoint import Checkpoint
 from sph.output.files import is_same_path
 from sph.output.run_directory import RunDirectory
+from sph.summary import Errors
 
 # Times closer than this, relative to the later one, are one: runs land on their outputs.
 SAME_TIME = 1e-9
-# Particles of the reference handled at once: some million pairs in 3-D.
-CHUNK = 10_000
 
 
 class Reference:
-    """A run directory whose checkpoints stand for the truth. Raises FileError."""
+    """A run directory whose checkpoints errors are taken against. Raises FileError."""
 
     def __init__(self, path: Path):
         self.run = RunDirectory.open(path)
@@ -53,9 +52,9 @@ class Reference:
 
 
 def check(config: Config, target: Path | None) -> None:
-    """See that a run into `target` will find at its end the reference it names, if it names one.
+    """Check that a run into `target` will find its reference, if it names one, when it ends.
 
-    target: None where nothing is to be written. Raises FileError where there is no such run or its
+    target: None where the run writes nothing. Raises FileError where there is no such run or its
     checkpoint is damaged, ConfigError where it has none at time.end, is of another problem or is
     `target` itself.
     """
@@ -71,17 +70,17 @@ def check(config: Config, target: Path | None) -> None:
     _check(config, fine.config, path, "this run")
 
 
-def errors_of(path: Path, reference: Reference) -> dict:
-    """`errors_against` of the last state in a run directory. Raises as it, and FileError."""
+def errors_of(path: Path, reference: Reference) -> Errors:
+    """`errors_against` of the last state in a run directory. Raises FileError and ConfigError."""
     return errors_against(checkpoint.read(RunDirectory.open(path).latest()), reference, str(path))
 
 
-def errors_against(coarse: Checkpoint, reference: Reference, name: str) -> dict:
-    """Norms of a state against the reference at its particles, as those of `against_exact`.
+def errors_against(coarse: Checkpoint, reference: Reference, name: str) -> Errors:
+    """Norms of a state against the reference, taken at the particles of the state.
 
-    The reference's fields are carried there by its own kernels, which smooth them over its own
-    spacing: it must be finer by more than the accuracy wanted. `name`: of the state's run, for
-    errors. Raises FileError, and ConfigError where the two do not fit.
+    The reference's fields are interpolated to these particles by its own kernels, which smooth them
+    over its particle spacing: the reference must be finer by more than the accuracy wanted. `name`:
+    the state's run, for error messages. Raises FileError, and ConfigError where the two do not fit.
     """
     fine = reference.at(coarse.time)
     _check(coarse.config, fine.config, reference.run.path, name)
@@ -101,39 +100,15 @@ def errors_against(coarse: Checkpoint, reference: Reference, name: str) -> dict:
 
 
 def at_points(state: Checkpoint, points: np.ndarray) -> dict[str, np.ndarray]:
-    """Fields of `state` at (D, M) points, velocity (D, M): NaN where no kernel reaches.
-
-    A(x) = sum_j V_j A_j W(x - x_j, H_j) / sum_j V_j W(x - x_j, H_j), V = m/rho, over particles and
-    their images (Shepard 1968); velocities of images in a wall are reflected.
-    """
-    particles, problem = state.particles, state.config.problem
-    kernel = state.config.physics.kernel_model()
-    dim, H = (0,) * particles.dimension, particles.support
-    # The normalisation C of the kernel cancels.
-    weight = particles.mass / (particles.density * H**particles.dimension)
-    fields = _fields(state)
-    scalars = np.stack([fields[name] for name in FIELDS if name != "velocity"])
-    tree = cKDTree(points.T)
-    low, high = points.min(axis=1), points.max(axis=1)
-    sums = np.zeros((len(scalars) + particles.dimension + 1, points.shape[1]))
-    domain = Domain(problem.box, problem.boundaries)
-    for sign, offset in zip(*domain.images_within(H.max()), strict=True):
-        image = sign[:, None] * particles.position + offset[:, None]
-        values = np.vstack([scalars, sign[:, None] * fields["velocity"], np.ones_like(H)])
-        reaches = (image + H > low[:, None]) & (image - H < high[:, None])
-        near = np.flatnonzero(reaches.all(axis=0))
-        for j in np.array_split(near, len(near) // CHUNK + 1):
-            found = tree.query_ball_point(image[:, j].T, H[j])
-            i = np.concatenate([*map(np.asarray, found), np.zeros(0)]).astype(int)
-            j = np.repeat(j, [len(one) for one in found])
-            q = np.linalg.norm(points[:, i] - image[:, j], axis=0) / H[j]
-            share = weight[j] * kernel.w(dim, q)
-            for total, value in zip(sums, values, strict=True):
-                total += np.bincount(i, share * value[j], total.size)
-    with np.errstate(invalid="ignore"):
-        means = sums[:-1] / np.where(sums[-1] > 0.0, sums[-1], np.nan)
+    """Fields of `state` at (D, M) points, see `interpolate`; velocity (D, M), the others (M,)."""
+    config, fields = state.config, _fields(state)
     names = [name for name in FIELDS if name != "velocity"]
-    return dict(zip(names, means, strict=False)) | {"velocity": means[len(names) :]}
+    domain = Domain(config.problem.box, config.problem.boundaries)
+    scalars, velocity = interpolate.at_points(
+        np.stack([fields[name] for name in names]), fields["velocity"], state.particles, domain,
+        config.physics.kernel_model(), points,
+    )  # fmt: skip
+    return dict(zip(names, scalars, strict=True)) | {"velocity": velocity}
 
 
 def _fields(state: Checkpoint) -> dict[str, np.ndarray]:

@@ -1,4 +1,4 @@
-"""The summary of a run: how wrong it is, what it kept, and what it cost; as data and in words."""
+"""Compute the summary of a run, and say it in words. `sph.summary` says what each figure is."""
 
 import resource
 import sys
@@ -8,22 +8,23 @@ import numpy as np
 from sph import warnings
 from sph.analysis import errors, truth
 from sph.config import restarts
+from sph.summary import Conservation, Cost, Status, Summary
 from sph.totals import Baseline
 from sph.version import __version__
 
 
 def of_run(
-    simulation, history: dict[str, np.ndarray], status: str, reason: str | None,
+    simulation, history: dict[str, np.ndarray], status: Status, reason: str | None,
     lineage: tuple[str, ...] = (),
-) -> dict:  # fmt: skip
-    """The summary as a dictionary, from the simulation's last state and the whole history.
+) -> Summary:  # fmt: skip
+    """The summary, from the simulation's last state and the whole history.
 
-    status: "done", "stopped" or "failed", then with the reason. Errors are those against the exact
-    solution; where the configuration names a reference they are left to `reference.errors_against`.
+    status: "done", "stopped" or "failed"; the last two with the reason. Errors are against the
+    exact solution; where the configuration names a reference, `reference.errors_against` has them.
     """
     scene, particles = simulation.scene, simulation.particles
-    inside, outside = scene.parts()
-    result = {
+    inside, outside = scene.described()
+    result: Summary = {
         "status": status,
         "reason": reason,
         "warnings": [],
@@ -38,7 +39,7 @@ def of_run(
         "errors": None,
         "errors_left_out": None,
         "report": None,
-        "conservation": conservation(history, particles, scene),
+        "conservation": conservation(history, particles, scene, simulation.baseline),
         "nearest": None,
         "cost": cost(simulation, history),
         "compiled_in": inside,
@@ -56,10 +57,10 @@ def of_run(
     return result
 
 
-def _judge(result: dict, simulation, history) -> None:
-    """Set errors and the problem's own figures of a run that has not failed."""
+def _judge(result: Summary, simulation, history) -> None:
+    """Set the errors and the problem's own figures of a run that has not failed."""
     config, now, particles = simulation.scene.config, simulation.time, simulation.particles
-    pressure = particles.pressure_by(simulation.scene.eos)
+    pressure = simulation.scene.formulation.pressure(particles)
     if not config.report.reference:
         result["errors"] = errors.against_exact(config, now, particles, pressure)
         result["errors_left_out"] = truth.left_out(config, now, particles.position)
@@ -68,30 +69,20 @@ def _judge(result: dict, simulation, history) -> None:
     result["report"] = truth.figures(config, now, particles, pressure, history)
 
 
-def warn(summary: dict, simulation) -> None:
+def warn(summary: Summary, simulation) -> None:
     """Set the warnings of a summary that is otherwise complete."""
     found = warnings.of_run(simulation, summary)
-    summary["warnings"] = [one._asdict() for one in found]
+    summary["warnings"] = [{"kind": one.kind, "text": one.text} for one in found]
 
 
-def conservation(history, particles, scene) -> dict[str, float | None]:
-    """What was kept over the whole history.
-
-    energy_drift: (E - E_0)/|E_0| at the end, and energy_drift_max its largest modulus at any step,
-    as `sph.totals.Baseline` has it: without the energy of bulk motion and without what heating
-    added; energy_injected: what keeping internal energies positive cost, a part of the drift and
-    relative to the same;
-    momentum_change: the largest |P - P_0| at any step over sum m (|v - v_bulk| + c_s) of the last
-    state, of the axes that keep momentum, None where there is none (walls, a field);
-    volume_ratio: sum m/rho over the volume of the box at the end, and volume_ratio_worst that
-    farthest from 1 at any step; None where gas does not fill a closed box.
-    """
+def conservation(history, particles, scene, start: Baseline) -> Conservation:
+    """What the run conserved, from its history, its last state, its scene and its baseline."""
     drift = history["energy_drift"]
     ratio = history.get("volume_ratio")
     return {
         "energy_drift": float(drift[-1]),
         "energy_drift_max": float(np.abs(drift).max()),
-        "energy_injected": float(history["energy_injected"][-1] / baseline(history).scale),
+        "energy_injected": float(history["energy_injected"][-1] / start.scale),
         "momentum_change": _momentum_change(history, particles, scene),
         "volume_ratio": None if ratio is None else float(ratio[-1]),
         "volume_ratio_worst": None if ratio is None else float(_farthest_from_one(ratio)),
@@ -99,7 +90,7 @@ def conservation(history, particles, scene) -> dict[str, float | None]:
 
 
 def baseline(history) -> Baseline:
-    """What the energy drift of a run is measured by, from the first row of its history."""
+    """The energy that the drift of a run is measured from, by the first row of its history."""
     potential = history["potential_energy"][0] if "potential_energy" in history else 0.0
     return Baseline.of(
         history["kinetic_energy_without_bulk"][0], history["internal_energy"][0], potential
@@ -114,7 +105,7 @@ def _momentum_change(history, particles, scene) -> float | None:
     p = particles
     with np.errstate(invalid="ignore"):  # the last state of a run that failed
         bulk = scene.keeps_momentum * (p.velocity @ p.mass) / p.mass.sum()
-        sound_speed = scene.eos.sound_speed(p.density, p.pressure_by(scene.eos))
+        sound_speed = scene.eos.sound_speed(p.density, scene.formulation.pressure(p))
         speed = np.linalg.norm(p.velocity - bulk[:, None], axis=0)
         scale = float(np.sum(p.mass * (speed + sound_speed)))
     return float(np.abs(momentum - momentum[:, :1]).max() / scale)
@@ -124,11 +115,10 @@ def _farthest_from_one(ratio: np.ndarray) -> float:
     return ratio[np.argmax(np.abs(np.log(ratio)))]
 
 
-def cost(simulation, history) -> dict:
-    """CPU and wall seconds of all sessions of the run; phases and updates of this one."""
+def cost(simulation, history) -> Cost:
+    """The cost of the run, from its history, and of this session, from the simulation's clock."""
     clock = simulation.clock
     phases = {name: round(seconds, 4) for name, seconds in clock.seconds.items()}
-    computing = clock.cpu - clock.compiling
     updates = simulation.particles.number * simulation.steps_here
     return {
         "cpu_seconds": float(history["cpu_seconds"][-1]),
@@ -137,7 +127,7 @@ def cost(simulation, history) -> dict:
         "session": {
             "steps": simulation.steps_here,
             "updates": updates,
-            "updates_per_cpu_second": round(updates / computing) if computing > 0 else None,
+            "updates_per_cpu_second": round(updates / clock.cpu) if clock.cpu > 0 else None,
             "cpu_seconds": round(clock.cpu, 4),
             "wall_seconds": round(clock.wall, 4),
             "compile_cpu_seconds": round(clock.compiling, 4),
@@ -155,14 +145,14 @@ def peak_memory() -> int:
 
 
 def _percent(relative: float | None) -> str:
-    """An error relative to the exact field, in brackets; nothing where that is zero."""
+    """An error relative to the exact field, in brackets; empty where that field is zero."""
     if relative is None:
         return ""
     return f" ({100.0 * relative:.2g} %)" if relative < 1.0 else f" ({relative:.2g} times its size)"
 
 
-def in_words(summary: dict) -> str:
-    """The closing words of a run: how it ended, its warnings, errors, what it kept and its cost."""
+def in_words(summary: Summary) -> str:
+    """The closing words of a run: its end, warnings, errors, conservation and cost."""
     lines = [
         f"{summary['problem']}: {summary['particles']} particles to t = {summary['time']:.6g} "
         f"in {summary['steps']} steps ({_ending(summary)}).",
@@ -179,18 +169,18 @@ def in_words(summary: dict) -> str:
     return "\n".join(lines)
 
 
-def _ending(summary: dict) -> str:
+def _ending(summary: Summary) -> str:
     count = len(summary["warnings"])
     warned = f", with {count} warning{'s' * (count > 1)}" if count else ""
     return f"{summary['status']}{warned}"
 
 
-def _changes_in_words(summary: dict) -> list[str]:
+def _changes_in_words(summary: Summary) -> list[str]:
     changed = summary["settings_changed"]
-    return [f"Settings changed on the way: {'; '.join(changed)}."] if changed else []
+    return [f"Settings changed in restarts: {'; '.join(changed)}."] if changed else []
 
 
-def _errors_in_words(summary: dict) -> str:
+def _errors_in_words(summary: Summary) -> str:
     errors = summary["errors"]
     if not errors:
         return f"Error: left out, because {summary['errors_left_out']}."
@@ -203,10 +193,8 @@ def _errors_in_words(summary: dict) -> str:
     return f"Error (L1 against {truth}, {errors['region']}): {fields}."
 
 
-def _kept_in_words(kept: dict) -> str:
-    change, injected, ratio = (
-        kept[name] for name in ("momentum_change", "energy_injected", "volume_ratio")
-    )
+def _kept_in_words(kept: Conservation) -> str:
+    change, injected, ratio = kept["momentum_change"], kept["energy_injected"], kept["volume_ratio"]
     parts = [f"energy to {kept['energy_drift_max']:.2g}"]
     if injected:
         parts[0] += f" ({injected:.2g} of it to keep internal energies positive)"
@@ -220,11 +208,11 @@ def _kept_in_words(kept: dict) -> str:
     return f"Conserved, at worst over the run: {'; '.join(parts)}."
 
 
-def _cost_in_words(cost: dict) -> str:
+def _cost_in_words(cost: Cost) -> str:
     session = cost["session"]
     rate = session["updates_per_cpu_second"] or 0
     return (
         f"Cost: {session['wall_seconds']:.3g} s, {session['cpu_seconds']:.3g} CPU s on "
-        f"{cost['threads']} thread(s), of which {session['compile_cpu_seconds']:.2g} s compiling; "
-        f"{rate:,} particle updates per CPU-second."
+        f"{cost['threads']} thread(s), and {session['compile_cpu_seconds']:.2g} CPU s for "
+        f"compilation; {rate:,} particle updates per CPU-second."
     )

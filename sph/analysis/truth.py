@@ -1,6 +1,6 @@
-"""Where, until when and under which physics a problem's exact solution holds.
+"""Where, until when and under which physics the exact solution of a problem holds.
 
-Whoever compares with an exact solution, or draws one, asks here.
+All comparisons with exact solutions, and all figures of them, use these functions.
 """
 
 import numpy as np
@@ -9,7 +9,7 @@ from sph.config import Config
 
 
 def departure(config: Config, time: float) -> str | None:
-    """Why exact solution and theory do not hold at `time` for this configuration, or None."""
+    """Why exact solution and theory do not hold for this configuration at `time`, or None."""
     problem = config.problem
     if reason := problem.departs(config.physics):
         return reason
@@ -18,20 +18,20 @@ def departure(config: Config, time: float) -> str | None:
 
 
 def left_out(config: Config, time: float, position: np.ndarray) -> str | None:
-    """Why there are no errors at (D, N) particles against an exact solution; None if there are."""
+    """Why errors against the exact solution cannot be taken at (D, N) particles, or None."""
     if reason := departure(config, time):
         return reason
     problem, eos = config.problem, config.physics.eos_model()
     if problem.exact(eos, time, position[:, :1]) is None:
         return "this problem has no exact solution"
     inside, words = region(problem, eos, time, position)
-    return None if inside.any() else f"no particle is left where it can be taken, {words}"
+    return None if inside.any() else f"no particle is in the region where errors are taken, {words}"
 
 
 def region(problem, eos, time: float, position: np.ndarray) -> tuple[np.ndarray, str]:
     """(N,) mask of the particles over which errors are taken, and that region in words.
 
-    The problem's error region, without what waves from the ends of the domain have reached.
+    The error region of the problem, less where waves from the ends of the domain have arrived.
     """
     inside, words = problem.error_region(eos, time, position)
     reached = inside & ~within(problem, eos, time, position)
@@ -39,21 +39,21 @@ def region(problem, eos, time: float, position: np.ndarray) -> tuple[np.ndarray,
         return inside, words
     ends = zip("xyz", problem.undisturbed(eos, time), strict=False)
     ranges = [f"{low:.4g} < {axis} < {high:.4g}" for axis, (low, high) in ends if low > -np.inf]
-    undisturbed = f"{', '.join(ranges)}, where no wave from the domain's ends has come"
+    undisturbed = f"{', '.join(ranges)}, where no wave from the domain's ends has arrived"
     of_all = words == "the whole domain"
-    return inside & ~reached, undisturbed if of_all else f"{words}, of it {undisturbed}"
+    return inside & ~reached, undisturbed if of_all else f"{words}, within {undisturbed}"
 
 
 def within(problem, eos, time: float, position: np.ndarray) -> np.ndarray:
-    """(N,) whether no wave from the ends of the domain has come to the (D, N) positions."""
+    """(N,) whether no wave from the ends of the domain has arrived at the (D, N) positions."""
     low, high = problem.undisturbed(eos, time).T[..., None]
     return np.all((low < position) & (position < high), axis=0)
 
 
 def figures(config: Config, time: float, particles, pressure, history=None) -> dict[str, float]:
-    """All figures of the problem: those beside the exact solution and theory where these hold.
+    """All figures of the problem; comparisons with exact solution and theory where these hold.
 
-    history: its columns (steps,), or None to leave out the figures that it has.
+    history: columns (steps,), or None to leave out figures of the history.
     """
     problem, eos = config.problem, config.physics.eos_model()
     found = problem.report(eos, time, particles, pressure)
@@ -65,7 +65,7 @@ def figures(config: Config, time: float, particles, pressure, history=None) -> d
 
 
 def theory(config: Config, times: np.ndarray) -> dict[str, np.ndarray]:
-    """What theory says of columns of the history at `times` (M,), where it has this physics."""
+    """Theory for columns of the history at `times` (M,), where it holds for this physics."""
     if config.problem.departs(config.physics):
         return {}
     return config.problem.theory(config.physics.eos_model(), times)

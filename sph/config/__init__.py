@@ -1,6 +1,7 @@
-"""The configuration: read from a file, overridden, written back, and a template of it."""
+"""The configuration of a run: read from TOML, overridden, written as TOML, and a template."""
 
 import dataclasses
+import functools
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -10,7 +11,8 @@ from pydantic import BaseModel
 from sph import registry
 from sph.config import commented, reading
 from sph.config.errors import suggestion
-from sph.config.sections import SECTIONS, Output, Physics, Report, Run, Time
+from sph.config.physics import Physics
+from sph.config.sections import SECTIONS, Output, Report, Run, Time
 from sph.config.toml_text import key_text, value_text
 from sph.errors import ConfigError
 from sph.problems.base import Problem
@@ -18,7 +20,7 @@ from sph.problems.base import Problem
 
 @dataclasses.dataclass(frozen=True)
 class Config:
-    """A complete and valid configuration: one attribute a table, every key resolved."""
+    """A complete and valid configuration: one attribute per table, with a value for every key."""
 
     problem: Problem
     physics: Physics
@@ -28,42 +30,47 @@ class Config:
     run: Run
 
     def to_toml(self, include_run: bool = True) -> str:
-        """All keys in their declared order; reading it back gives an equal configuration."""
+        """Return all keys in declared order as TOML that reads back to an equal configuration."""
         tables = _tables(self)
         if not include_run:
             del tables["run"]
         return "\n".join(_table_text(name, keys) for name, keys in tables.items())
 
+    @functools.cached_property
+    def recorded(self) -> str:
+        """The TOML text that checkpoints keep: all keys but those of [run]."""
+        return self.to_toml(include_run=False)
+
     def override(self, overrides: Sequence[str]) -> "Config":
-        """This configuration with `a.b=VALUE` set on top. Raises ConfigError."""
+        """Return a copy with the overrides `a.b=VALUE` applied. Raises ConfigError."""
         source = reading.Source("the configuration of the run", _tables(self), {})
         return _resolve(source, overrides)
 
 
 def load(path: str | Path, overrides: Sequence[str] = ()) -> Config:
-    """The configuration in a file, with `a.b=VALUE` set on top of it.
+    """Return the configuration in a file, with the overrides `a.b=VALUE` applied.
 
-    Raises FileError if the file cannot be read, ConfigError naming everything wrong in it.
+    Raises FileError if the file cannot be read, and ConfigError that lists every error in it.
     """
     return _resolve(reading.parse(reading.read(path), str(path)), overrides)
 
 
 def from_text(text: str, source: str = "checkpoint") -> Config:
-    """The configuration of a run, in a TOML text; `source` names it in errors.
+    """Return the configuration of an existing run from its TOML text. Raises ConfigError.
 
-    Raises ConfigError.
+    source: name of the text in error messages.
     """
     return _resolve(reading.parse(text, source), (), recorded=True)
 
 
 def template(problem: str) -> str:
-    """A commented TOML for that problem: every key, its help, bounds and default.
+    """Return commented TOML for a problem: every key with its help, bounds and default.
 
-    Raises ConfigError, naming the nearest problem, if there is none of that name.
+    Raises ConfigError, which names the most similar problem, if there is no problem of that name.
     """
     problems = registry.names("sph.problems")
     if problem not in problems:
-        raise ConfigError(f'there is no problem "{problem}"; {suggestion(problem, problems)}')
+        raise ConfigError(f'unknown problem "{problem}"; {suggestion(problem, problems)}')
     default = from_text(f'[problem]\nname = "{problem}"\n')
     return commented.text({name: getattr(default, name) for name in _names()})
 
@@ -78,7 +85,7 @@ def _names() -> list[str]:
 
 def _tables(config: Config) -> dict[str, dict[str, Any]]:
     sections: dict[str, BaseModel] = {name: getattr(config, name) for name in _names()}
-    # A key that is not set (gamma beside eos) has no place in TOML.
+    # TOML cannot express None, the value of a key that is not set (gamma if eos is given).
     return {name: section.model_dump(exclude_none=True) for name, section in sections.items()}
 
 

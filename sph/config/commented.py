@@ -1,6 +1,7 @@
-"""A commented configuration to start from."""
+"""The commented configuration that `sph new` prints."""
 
 import textwrap
+from collections.abc import Mapping
 from typing import Any
 
 from pydantic import BaseModel
@@ -10,14 +11,15 @@ from sph.config import restarts
 from sph.config.errors import branches, describe, field_annotation
 from sph.config.toml_text import value_text
 from sph.docstrings import docstring
+from sph.problems.base import Section
 
 
-def text(sections: dict[str, BaseModel]) -> str:
-    """TOML with every key of these tables at its value, above it its help, bounds and default."""
+def text(sections: Mapping[str, Section]) -> str:
+    """Return TOML with every key; a comment above each gives its help, bounds and default."""
     return "\n".join(_table(name, section) for name, section in sections.items())
 
 
-def _table(name: str, section: BaseModel) -> str:
+def _table(name: str, section: Section) -> str:
     model = type(section)
     keys = (
         _key(key, field, _help(model, key), getattr(section, key), _restart(model, key))
@@ -28,13 +30,13 @@ def _table(name: str, section: BaseModel) -> str:
 
 
 def _help(model: type[BaseModel], key: str) -> str:
-    """What the key is, from the class or the nearest base class that says so."""
+    """Return the description of a key, from the class or the nearest base class that has one."""
     fields = (base.model_fields.get(key) for base in model.__mro__ if issubclass(base, BaseModel))
     return next((field.description for field in fields if field and field.description), key)
 
 
-def _restart(model: type[BaseModel], key: str) -> str:
-    """The key's class in a restart, where not all keys of its table have the same."""
+def _restart(model: type[Section], key: str) -> str:
+    """Return the key's class in a restart, or "" if all keys of its table have the same class."""
     return "" if model.restart else f"in a restart: {restarts.class_of(model, key)}"
 
 
@@ -52,7 +54,7 @@ def _key(key: str, field: FieldInfo, sentence: str, value: Any, restart: str) ->
 
 
 def _entries(branch: Any) -> str:
-    """A line for each entry, where the value may be a table."""
+    """Return a comment line for each key of an inline table, "" if the value is not a table."""
     if not (isinstance(branch, type) and issubclass(branch, BaseModel)):
         return ""
     lines = (

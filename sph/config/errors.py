@@ -1,4 +1,4 @@
-"""What is wrong with a configuration, in plain words: where, what was found, what was expected."""
+"""Messages on a wrong configuration: where, what was found, what was expected."""
 
 import difflib
 import math
@@ -16,34 +16,34 @@ from sph.config.toml_text import Path, value_text
 
 
 class Issue(NamedTuple):
-    """One thing wrong: the key it concerns, and a text that continues the key's name."""
+    """One error: the path of the key, and the text that follows the key's name in the message."""
 
     path: Path
     text: str
 
 
 def dotted(path: Path) -> str:
-    """A path as the user writes it: ("problem", "domain", 1) is "problem.domain[1]"."""
+    """Return a path as the user writes it: ("problem", "domain", 1) gives "problem.domain[1]"."""
     text = "".join(f"[{step}]" if isinstance(step, int) else f".{step}" for step in path)
     return text.removeprefix(".")
 
 
 def nearest(name: str, valid: Iterable[str]) -> str | None:
-    """The valid name most like `name`, if any is alike."""
+    """Return the valid name that is most similar to `name`, or None if none is similar."""
     by_lower = {one.lower(): one for one in valid}
     close = difflib.get_close_matches(name.lower(), by_lower, n=1, cutoff=0.5)
     return by_lower[close[0]] if close else None
 
 
 def suggestion(name: str, valid: Iterable[str]) -> str:
-    """A sentence's end that leads from a wrong name to a valid one."""
+    """Return the end of a message on a wrong name: the most similar valid name, or all names."""
     valid = list(valid)
     close = nearest(name, valid)
-    return f"did you mean {close}?" if close else f"there are {', '.join(valid) or 'none'}"
+    return f"did you mean {close}?" if close else f"expected one of {', '.join(valid) or 'none'}"
 
 
 def wrong_value(path: Path, value: Any, annotation: Any) -> Issue:
-    """`value` does not fit the annotation of its key."""
+    """Return the issue that `value` does not match `annotation`, the type of its key."""
     hint = ""
     if isinstance(value, str) and (close := nearest(value, valid_names(annotation))):
         hint = f'; did you mean "{close}"?'
@@ -51,7 +51,7 @@ def wrong_value(path: Path, value: Any, annotation: Any) -> Issue:
 
 
 def not_finite(value: Any, path: Path = ()) -> Iterator[Issue]:
-    """One issue for every infinite or undefined number in a tree of tables and lists."""
+    """Yield an issue for every infinity and NaN in nested tables and lists."""
     if isinstance(value, float) and not math.isfinite(value):
         yield Issue(path, f"= {_found(value)}: expected a finite number")
     elif isinstance(value, dict | list):
@@ -60,7 +60,7 @@ def not_finite(value: Any, path: Path = ()) -> Iterator[Issue]:
 
 
 def as_error(issues: Iterable[Issue]) -> PydanticCustomError:
-    """To raise in a validator: issues with paths relative to the value it validates."""
+    """Return an error to raise in a validator. Paths of the issues are relative to its value."""
     return PydanticCustomError("issues", "{issues}", {"issues": list(issues)})
 
 
@@ -69,19 +69,19 @@ def _found(value: Any) -> str:
     return text if len(text) <= 60 else text[:57] + "..."
 
 
-# --- types in words ---------------------------------------------------------------------------
+# --- descriptions of types --------------------------------------------------------------------
 
 _NOUNS = {float: "number", int: "whole number", str: "string"}
 _BOUNDS = {"gt": "greater than", "ge": "of at least", "lt": "less than", "le": "of at most"}
 
 
 def field_annotation(field: FieldInfo) -> Any:
-    """The type of a field with its bounds."""
+    """Return the type of a field with its bounds."""
     return Annotated[(field.annotation, *field.metadata)] if field.metadata else field.annotation
 
 
 def _plain(annotation: Any) -> tuple[Any, list[Any]]:
-    """The bare type and everything said about it."""
+    """Return the type without its annotations, and the list of its annotations."""
     if typing.get_origin(annotation) is not Annotated:
         return annotation, []
     bare, *said = typing.get_args(annotation)
@@ -92,7 +92,7 @@ def _plain(annotation: Any) -> tuple[Any, list[Any]]:
 
 
 def branches(annotation: Any) -> list[Any]:
-    """The alternatives of a union other than None; of anything else itself."""
+    """Return the alternatives of a union other than None; a list of the type itself if no union."""
     bare, said = _plain(annotation)
     if _choice(said) or typing.get_origin(bare) not in (types.UnionType, typing.Union):
         return [annotation]
@@ -125,7 +125,7 @@ def _length(said: list[Any]) -> str:
 
 
 def describe(annotation: Any, plural: bool = False) -> str:
-    """A type with its bounds in words, e.g. "a number greater than 1"."""
+    """Return a description of a type and its bounds, e.g. "a number greater than 1"."""
     alternatives = branches(annotation)
     if len(alternatives) > 1:
         return _any_of(alternatives, plural)
@@ -156,7 +156,7 @@ def _any_of(alternatives: list[Any], plural: bool) -> str:
 
 
 def valid_names(annotation: Any) -> list[str]:
-    """Every fixed name a value of this type may be."""
+    """Return all fixed names that are valid values of this type."""
     found: list[str] = []
     for branch in branches(annotation):
         bare, said = _plain(branch)
@@ -170,7 +170,7 @@ def valid_names(annotation: Any) -> list[str]:
 
 
 def inner(annotation: Any, path: Path) -> Any:
-    """The type of the entry at `path` within a value of this type."""
+    """Return the type of the entry at `path` within a value of type `annotation`."""
     for step in path:
         found = []
         for branch in branches(annotation):
@@ -190,13 +190,13 @@ def inner(annotation: Any, path: Path) -> Any:
 
 class _Located(NamedTuple):
     path: Path  # steps into the value
-    union: Path | None  # where the first union on the way stands
+    union: Path | None  # path of the first union passed on the way
     branch: str | int | None  # which of its alternatives was tried
     error: ErrorDetails
 
 
 def _locate(error: ErrorDetails, raw: Any) -> _Located:
-    """Tell the steps into the value from pydantic's names of a union's branches."""
+    """Separate the steps into the value from the names that pydantic gives to union branches."""
     steps = error["loc"]
     path, union, branch, value = [], None, None, raw
     for i, step in enumerate(steps):
@@ -212,18 +212,21 @@ def _locate(error: ErrorDetails, raw: Any) -> _Located:
     return _Located(tuple(path), union, branch, error)
 
 
-_SAID_IN_WORDS = ("value_error", "assertion_error", "issues")
+_HAVE_OWN_TEXT = ("value_error", "assertion_error", "issues")
 
 
 def _of_one_branch(found: list[_Located]) -> list[_Located]:
-    """A union reports every branch: keep the one the user meant, or one report on the whole."""
+    """Return the errors of one branch of a union, of which pydantic reports every branch.
+
+    This is the branch that the user most likely meant, or one error for the whole union.
+    """
     tried = defaultdict(list)
     for one in found:
         tried[one.branch].append(one)
     meant = [
         errors
         for errors in tried.values()
-        if all(one.path != one.union or one.error["type"] in _SAID_IN_WORDS for one in errors)
+        if all(one.path != one.union or one.error["type"] in _HAVE_OWN_TEXT for one in errors)
     ]
     if not meant:
         return [next(one for one in found if one.path == one.union)]
@@ -237,9 +240,9 @@ def explain(
     table: str,
     elsewhere: dict[str, str],
 ) -> list[Issue]:
-    """Pydantic's errors on `raw`, the table named `table`, one issue for each thing wrong.
+    """Return one issue for each error that pydantic found in `raw`, the table named `table`.
 
-    `elsewhere` names the table of each key of the other tables.
+    `elsewhere` maps each key of the other tables to its table.
     """
     located = [_locate(error, raw) for error in errors]
     unions = defaultdict(list)
@@ -277,7 +280,10 @@ def _unknown_key(path: Path, holder: Any, elsewhere: dict[str, str]) -> Issue:
 
 
 def unknown_key(path: Path, valid: Iterable[str], elsewhere: dict[str, str]) -> Issue:
-    """The last step of `path` is no key of its table, whose valid keys are given."""
+    """Return the issue that the last step of `path` is not a key of its table.
+
+    `valid` holds the keys of the table; `elsewhere` maps keys of other tables to their table.
+    """
     key, table = str(path[-1]), dotted(path[:-1])
     if key in elsewhere:
         return Issue(path, f"is not a key of [{table}]: {key} belongs in [{elsewhere[key]}]")

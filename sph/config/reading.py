@@ -1,4 +1,4 @@
-"""From the text of a configuration to its valid tables, keeping in mind where each key stood."""
+"""Reading of a configuration: TOML text to validated tables, with the line of each key."""
 
 import re
 import tomllib
@@ -10,7 +10,7 @@ from pydantic import ValidationError
 from pydantic_core import ErrorDetails
 
 from sph import registry
-from sph.config import checks
+from sph.config import checks, physics
 from sph.config.errors import (
     Issue,
     dotted,
@@ -23,31 +23,31 @@ from sph.config.toml_text import Path, key_lines, value_text
 from sph.errors import ConfigError, FileError
 from sph.problems.base import Problem, Section
 
-# Of two keys for the same thing, the one the user gives leaves the other's default out.
+# Keys that exclude each other: if the user gives one, the default of the other is not used.
 _IN_PLACE_OF = {"physics.eos": "gamma", "physics.gamma": "eos"}
 
 
 class Source(NamedTuple):
-    """Raw tables, and where each key was given: a line, or an override's own text."""
+    """Tables before validation, and the origin of each key: a line number or an override."""
 
     name: str
     tables: dict[str, Any]
     places: dict[Path, int | str]
 
     def place(self, path: Path) -> int | str:
-        """Where `path` was given, or the nearest table around it; 0 where nowhere."""
+        """Return the origin of `path`, or of the innermost table around it that has one, else 0."""
         ends = range(len(path), 0, -1)
         return next((self.places[path[:end]] for end in ends if path[:end] in self.places), 0)
 
     def report(self, issue: Issue) -> str:
-        """The issue on one line, with its place."""
+        """Return the message of an issue, one line that begins with its origin."""
         place = self.place(issue.path)
         where = place if isinstance(place, str) else self.name
         line = f", line {place}" if isinstance(place, int) and place else ""
         return f"{where}{line}: {dotted(issue.path)}{_spaced(issue.text)}"
 
     def order(self, issue: Issue) -> tuple[bool, int]:
-        """Sorts issues by line, those of overrides last."""
+        """Return a key that sorts issues by line, with those of overrides last."""
         place = self.place(issue.path)
         return (True, 0) if isinstance(place, str) else (False, place)
 
@@ -56,25 +56,25 @@ def _spaced(text: str) -> str:
     return text if text.startswith(":") else f" {text}"
 
 
-# --- text to raw tables -----------------------------------------------------------------------
+# --- text to tables ---------------------------------------------------------------------------
 
 
 def read(path: str | FilePath) -> str:
-    """The text of a file. Raises FileError."""
+    """Return the text of a file. Raises FileError."""
     try:
         return FilePath(path).read_bytes().decode("utf-8-sig")
     except FileNotFoundError:
-        raise FileError(f"{path}: there is no such file") from None
+        raise FileError(f"{path}: file not found") from None
     except IsADirectoryError:
-        raise FileError(f"{path}: a directory; expected a configuration file") from None
+        raise FileError(f"{path}: is a directory; expected a configuration file") from None
     except OSError as error:
         raise FileError(f"{path}: cannot be read ({error.strerror})") from None
     except UnicodeDecodeError:
-        raise FileError(f"{path}: not a configuration file (it is no UTF-8 text)") from None
+        raise FileError(f"{path}: not a configuration file (it is not UTF-8 text)") from None
 
 
 def parse(text: str, name: str) -> Source:
-    """Raw tables of a TOML text. Raises ConfigError where it is not TOML."""
+    """Return the tables of a TOML text. Raises ConfigError if the text is not valid TOML."""
     try:
         return Source(name, tomllib.loads(text), dict(key_lines(text)))
     except (ValueError, RecursionError) as error:
@@ -90,7 +90,7 @@ def _syntax_message(message: str, text: str, name: str) -> str:
 
 
 def _value(text: str) -> Any:
-    """A value given on the command line: TOML, else the text itself."""
+    """Return a value given on the command line: parsed as TOML, or else the text itself."""
     try:
         found = tomllib.loads(f"value = {text}")
     except (ValueError, RecursionError):
@@ -99,7 +99,7 @@ def _value(text: str) -> Any:
 
 
 def _set(source: Source, override: str) -> None:
-    """Set one `a.b=VALUE` in the source. Raises ConfigError if it has no such form."""
+    """Set one override `a.b=VALUE` in the source. Raises ConfigError if its form is wrong."""
     name, equals, text = override.partition("=")
     path = tuple(step.strip() for step in name.split("."))
     if not equals or not all(path):
@@ -107,7 +107,7 @@ def _set(source: Source, override: str) -> None:
     try:
         override.encode()
     except UnicodeEncodeError:
-        raise ConfigError(f"--set {override}: expected UTF-8 text, as in a file") from None
+        raise ConfigError(f"--set {override}: expected UTF-8 text") from None
     table = source.tables
     for step in path[:-1]:
         if not isinstance(table.get(step), dict):
@@ -121,7 +121,7 @@ def _set(source: Source, override: str) -> None:
     source.places[path] = f"--set {override}"
 
 
-# --- raw tables to valid ones -----------------------------------------------------------------
+# --- validation -------------------------------------------------------------------------------
 
 
 def resolve(
@@ -129,21 +129,27 @@ def resolve(
     overrides: Sequence[str],
     sections: dict[str, type[Section]],
     recorded: bool = False,
-) -> dict[str, Section]:
-    """The valid tables by name. Raises ConfigError with one line for each thing wrong.
+) -> dict[str, Any]:
+    """Return the validated tables by name. Raises ConfigError with one line for each error.
 
-    recorded: the source describes a run that exists, which stays readable where a new run with its
-    settings would be refused.
+    recorded: the source is the configuration of an existing run. Such a run stays readable even if
+    a new run with its settings would be refused.
     """
     for override in overrides:
         _set(source, override)
-    models: dict[str, type[Section]] = {"problem": Problem, **sections}
+    models: dict[str, type[Section]] = {
+        "problem": Problem, "physics": physics.table(physics.DEFAULT), **sections
+    }  # fmt: skip
     raw, issues = _known_tables(source.tables, models)
     issues += checks.both_given(raw)
     problem = _problem_class(raw["problem"], issues)
     if problem is not None:
         models["problem"] = problem
-        _fill_defaults(raw, problem)
+        raw["physics"].setdefault(
+            "formulation", problem.defaults.get("physics.formulation", physics.DEFAULT)
+        )
+        models["physics"] = physics.chosen(raw["physics"])
+        _fill_defaults(raw, problem, models)
         _fill_tables(raw["problem"], source, problem)
         issues += checks.shape_issues(raw["problem"], problem)
     issues += not_finite(raw)
@@ -158,13 +164,11 @@ def resolve(
             details = _details(error, problem is not None, bool(spoilt))
             elsewhere = _tables_of_keys(models, besides=name)
             issues += explain(model, raw[name], details, name, elsewhere)
-        except ArithmeticError as error:  # in a check across keys, such as a count of lattice cells
-            text = (
-                f": {error}; expected numbers nearer to 1, and a domain with sides of like length"
-            )
+        except ArithmeticError as error:  # in a validator, such as the count of lattice cells
+            text = f": {error}; expected numbers closer to 1, and domain sides of similar length"
             issues.append(Issue((name,), text))
     issues += checks.gas_issues(found)
-    issues += checks.external_issues(found)
+    issues += checks.part_issues(found)
     if not recorded:
         issues += checks.pairing_issues(found)
     issues += checks.output_issues(found)
@@ -174,14 +178,14 @@ def resolve(
 
 
 def _without(table: dict[str, Any], keys: set[Any]) -> dict[str, Any]:
-    """The table without keys that are known to be wrong: a problem's checks may rely on them."""
+    """Return the table without keys known to be wrong, on which a problem's checks may rely."""
     return {key: value for key, value in table.items() if key not in keys}
 
 
 def _details(error: ValidationError, problem_known: bool, spoilt: bool) -> list[ErrorDetails]:
-    """The errors but for those that only follow from others already found."""
+    """Return the errors that do not merely follow from errors already reported."""
     found = error.errors(include_url=False)
-    if not problem_known:  # what is missing may have a default that the problem gives
+    if not problem_known:  # the problem might give a default for a missing key
         found = [one for one in found if one["type"] != "missing"]
     return [one for one in found if one["loc"]] if spoilt else found
 
@@ -196,7 +200,7 @@ def _reports(source: Source, issues: Iterable[Issue]) -> list[str]:
 def _known_tables(
     given: dict[str, Any], models: dict[str, type[Section]]
 ) -> tuple[dict[str, dict[str, Any]], list[Issue]]:
-    """A copy of every table, empty where not given; issues for all that is no table."""
+    """Return a copy of every table (empty if not given), and issues for all that is not a table."""
     issues = []
     for name, value in given.items():
         if name not in models:
@@ -212,22 +216,22 @@ def _known_tables(
 
 def _unknown_table(name: str, value: Any, models: dict[str, type[Section]]) -> Issue:
     if name in (elsewhere := _tables_of_keys(models)):
-        return Issue((name,), f"is not a table: it belongs in [{elsewhere[name]}]")
+        return Issue((name,), f"is not a table but a key of [{elsewhere[name]}]")
     if isinstance(value, dict):
-        return Issue((name,), f"is not a table of a configuration; {suggestion(name, models)}")
+        return Issue((name,), f"is not a table of the configuration; {suggestion(name, models)}")
     tables = ", ".join(f"[{one}]" for one in models)
-    return Issue((name,), f"stands outside the tables; every key belongs in one of {tables}")
+    return Issue((name,), f"is outside all tables: expected every key in one of {tables}")
 
 
 def _tables_of_keys(models: dict[str, type[Section]], besides: str = "") -> dict[str, str]:
-    """The table of each key, but for one table's."""
+    """Return the table of each key, except for the keys of table `besides`."""
     return {
         key: name for name, model in models.items() if name != besides for key in model.model_fields
     }
 
 
 def _problem_class(raw: dict[str, Any], issues: list[Issue]) -> type[Problem] | None:
-    """The class of the problem that is named; None, with an issue, where it names none."""
+    """Return the class of the problem named in `raw`, or None, with an issue, if there is none."""
     valid, path = registry.names("sph.problems"), ("problem", "name")
     name = raw.get("name")
     if name in valid:
@@ -241,18 +245,26 @@ def _problem_class(raw: dict[str, Any], issues: list[Issue]) -> type[Problem] | 
     return None
 
 
-def _fill_defaults(raw: dict[str, dict[str, Any]], problem: type[Problem]) -> None:
-    """Put the problem's own defaults under what the user gave."""
+def _fill_defaults(
+    raw: dict[str, dict[str, Any]], problem: type[Problem], models: dict[str, type[Section]]
+) -> None:
+    """Add the problem's own defaults to keys that the user did not give.
+
+    A default for a key that the formulation does not have is for another formulation.
+    """
     for key, value in problem.defaults.items():
         table, name = key.split(".", 1)
+        if name not in models[table].model_fields:
+            continue
         if _IN_PLACE_OF.get(key) not in raw[table]:
             raw[table].setdefault(name, value)
 
 
 def _fill_tables(raw: dict[str, Any], source: Source, problem: type[Problem]) -> None:
-    """Put a table's default under members of it that --set gives alone, as in any other table.
+    """Complete inline tables of [problem] of which --set gives some keys, from their defaults.
 
-    A table that is given itself must be complete: half of a gas is not that of another tube.
+    An inline table that the file gives must be complete. Otherwise a gas could be mixed from two
+    shock tubes.
     """
     for name, field in problem.model_fields.items():
         path = ("problem", name)

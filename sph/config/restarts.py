@@ -1,7 +1,7 @@
-"""What a restart may change: the class of each key, and words for what was changed.
+"""Changes of the configuration in a restart: the class of each key, and messages on changes.
 
-A key's class stands where the key is declared, `Field(..., json_schema_extra=RECORDED)`, or once
-for all keys of a table, in its class attribute `restart`.
+The class is declared with the key, `Field(..., json_schema_extra=RECORDED)`, or for all keys of a
+table in its class attribute `restart`.
 """
 
 import re
@@ -12,10 +12,13 @@ from sph.config.toml_text import value_text
 from sph.problems.base import Section
 
 CLASSES = {
-    "free": "changes no result, or only how far and how often",
-    "recorded": "changes the equations or their numerical solution; goes into the run's lineage",
-    "same kind": "recorded; a number stays a number, a table a table, and none stays none",
-    "refused": "the checkpoint's gas and the start of its energy budget depend on it",
+    "free": "may change; affects no result, or only the end time and the output times",
+    "recorded": "may change; affects the equations or their numerical solution, so the change is "
+    "recorded in the run's lineage",
+    "same kind": "as recorded, but a number must stay a number, a table a table, and a key that is "
+    "not given must stay so",
+    "refused": "may not change, because the state in the checkpoint and the reference value of "
+    "energy drift depend on it",
 }
 FREE, RECORDED, SAME_KIND, REFUSED = ({"restart": name} for name in CLASSES)
 
@@ -24,7 +27,7 @@ _LINEAGE = re.compile(r"restarted at step \d+, t = (\S+) with (.+)")
 
 
 class Change(NamedTuple):
-    """A key as TABLE.KEY, its values (None: not given) and its class."""
+    """A changed key TABLE.KEY, its values before and now (None: not given), and its class."""
 
     key: str
     was: Any
@@ -36,12 +39,14 @@ class Change(NamedTuple):
 
 
 def class_of(section: type[Section], key: str) -> str | None:
-    """The name in CLASSES of a key of that table, None where it is not declared."""
-    return (section.model_fields[key].json_schema_extra or {}).get("restart", section.restart)
+    """Return the class (a key of CLASSES) of a key of that table, or None if none is declared."""
+    declared = section.model_fields[key].json_schema_extra
+    found = declared.get("restart") if isinstance(declared, dict) else None
+    return section.restart if found is None else str(found)
 
 
 def changes(before, after) -> list[Change]:
-    """The keys in which the `Config` after differs from that before."""
+    """Return the keys whose values differ between two `Config`s."""
     found = []
     for table, section in vars(after).items():
         was = getattr(before, table).model_dump(exclude_none=True)
@@ -55,13 +60,13 @@ def changes(before, after) -> list[Change]:
 
 
 def refusals(changed: Iterable[Change]) -> list[str]:
-    """A line for each change that a restart cannot make."""
+    """Return one message for each change that is not allowed in a restart."""
     found = []
     for one in changed:
         if one.rule == "refused":
             found.append(
-                f"{one.key} cannot be changed in a restart, which continues the gas of the "
-                "checkpoint and measures energy drift from the start of the run"
+                f"{one.key} cannot be changed in a restart, because the state in the checkpoint "
+                "depends on it and energy drift is measured from the start of the run"
             )
         elif one.rule == "same kind" and type(one.was) is not type(one.now):
             kind = _KINDS[type(one.was)]
@@ -70,13 +75,13 @@ def refusals(changed: Iterable[Change]) -> list[str]:
 
 
 def lineage(step: int, time: float, changed: Iterable[Change]) -> str:
-    """The line about a restart in the lineage of the checkpoints that it writes."""
+    """Return the line on a restart for the lineage of the checkpoints that it writes."""
     recorded = ", ".join(str(one) for one in changed if one.rule != "free")
     return f"restarted at step {step}, t = {time!r}{f' with {recorded}' if recorded else ''}"
 
 
 def settings_changed(lines: Sequence[str]) -> list[str]:
-    """What a lineage says of changed settings: "KEY = VALUE (was VALUE) at t = TIME"."""
+    """Return the changed settings in a lineage, each "KEY = VALUE (was VALUE) at t = TIME"."""
     found = map(_LINEAGE.fullmatch, lines)
     return [f"{match[2]} at t = {float(match[1]):g}" for match in found if match]
 

@@ -1,4 +1,4 @@
-"""TOML as text: in which line each key stands (the standard reader does not say), and values."""
+"""TOML text: the line of each key, which tomllib does not give, and values written as TOML."""
 
 import re
 import tomllib
@@ -8,7 +8,7 @@ import tomli_w
 
 Path = tuple[str | int, ...]
 
-# The longest form of a string first; a closing triple quote may follow up to two quotes of content.
+# The longest form of a string comes first. Up to two quotes may precede a closing triple quote.
 _TOKEN = re.compile(
     r'''
     (?P<blank> [ \t\r]+ | \#[^\n]* )
@@ -31,14 +31,14 @@ def _tokens(text: str) -> list[_Token]:
     found, line = [], 1
     for match in _TOKEN.finditer(text):
         if match.lastgroup != "blank":
-            found.append(_Token(match.lastgroup, match.group(), line))
+            found.append(_Token(match.lastgroup or "", match.group(), line))
         line += match.group().count("\n")
     found.append(_Token("mark", "\n", line))
     return found
 
 
 class _Reader:
-    """Walks over a text that is known to be valid TOML."""
+    """Finds the lines of keys in a text that is known to be valid TOML."""
 
     def __init__(self, text: str):
         self.tokens = _tokens(text)
@@ -54,7 +54,7 @@ class _Reader:
         return self.tokens[self.at - 1]
 
     def key(self) -> tuple[Path, int]:
-        """A dotted key up to its `=` or `]`, and its line."""
+        """Read a dotted key up to its `=` or `]`; return its parts and its line."""
         parts, line = [], self.tokens[self.at].line
         while self.next not in "=]":
             token = self.take()
@@ -90,13 +90,14 @@ class _Reader:
     def pair(self, table: Path | None) -> None:
         key, line = self.key()
         self.take()  # =
-        path = None if table is None else table + key
-        if path is not None:
-            self.note(path, len(table), line)
-        self.value(path)
+        if table is None:
+            self.value(None)
+            return
+        self.note(table + key, len(table), line)
+        self.value(table + key)
 
     def value(self, path: Path | None) -> None:
-        """Skip a value, noting the keys of an inline table unless `path` is None (in an array)."""
+        """Skip a value; note the keys of an inline table unless `path` is None (in an array)."""
         if self.next == "{":
             self.entries("}", lambda: self.pair(path))
         elif self.next == "[":
@@ -116,9 +117,9 @@ class _Reader:
 
 
 def key_lines(text: str) -> dict[Path, int]:
-    """The line (from 1) where each table and key of a valid TOML text begins, by its path.
+    """Return the line (from 1) at which each table and key of a valid TOML text begins, by path.
 
-    Entries of an array have no line of their own: theirs is the line of the array's key.
+    Entries of an array are not listed; the array's key is.
     """
     reader = _Reader(text)
     reader.statements()
@@ -126,7 +127,7 @@ def key_lines(text: str) -> dict[Path, int]:
 
 
 def value_text(value: Any) -> str:
-    """A value as TOML on one line; tables inline."""
+    """Return a value as TOML on one line, with inline tables."""
     if isinstance(value, dict):
         pairs = (f"{key_text(key)} = {value_text(entry)}" for key, entry in value.items())
         return "{ " + ", ".join(pairs) + " }" if value else "{}"
@@ -136,5 +137,5 @@ def value_text(value: Any) -> str:
 
 
 def key_text(key: str) -> str:
-    """A key as TOML, quoted where it must be."""
+    """Return a key as TOML, quoted if necessary."""
     return tomli_w.dumps({key: 0}).removesuffix(" = 0\n")

@@ -1,42 +1,57 @@
-"""Equations of state: one file each, a NamedTuple with these methods.
+"""Equations of state, one file each."""
 
-    pressure(density, internal_energy)       P
-    sound_speed(density, pressure)           c_s
-    internal_energy(density, pressure)       u, the inverse of the first (initial states)
-
-and, where they end elsewhere than at u = 0,
-
-    lowest_energy(density)                   u of cold gas, at and below which there is no sound
-
-All take numbers in compiled code and NumPy arrays of any one shape elsewhere; code units.
-
-One that is an ideal gas in P + p_inf has the attributes `gamma` and `p_inf`, for exact solutions.
-"""
+from collections.abc import Callable
+from typing import Any, Protocol
 
 from sph import registry
 from sph.compiled import verb
+from sph.model import Model
+
+
+class EquationOfState(Protocol):
+    """An equation of state: a file with a NamedTuple that has these methods.
+
+    They take numbers in compiled code and arrays of any one shape elsewhere; code units. A gas that
+    is ideal in P + p_inf has the attributes gamma and p_inf, for exact solutions.
+    """
+
+    def pressure(self, density: Any, internal_energy: Any) -> Any:
+        """P"""
+
+    def sound_speed(self, density: Any, pressure: Any) -> Any:
+        """c_s"""
+
+    def internal_energy(self, density: Any, pressure: Any) -> Any:
+        """u, the inverse of `pressure`, for initial states."""
+
+
+class Defaults(Model):
+    """What the file of an equation of state may leave out."""
+
+    # lowest_energy(density): u of cold gas, at and below which sound has no speed; None: u = 0
+    lowest_energy: Callable[[Any], Any] | None = None
 
 
 @verb
-def pressure(self, density, internal_energy):
+def pressure(self: EquationOfState, density: Any, internal_energy: Any) -> Any:
     return self.pressure(density, internal_energy)
 
 
 @verb
-def sound_speed(self, density, pressure):
+def sound_speed(self: EquationOfState, density: Any, pressure: Any) -> Any:
     return self.sound_speed(density, pressure)
 
 
-def is_gamma_law(eos) -> bool:
-    """Whether P + p_inf = (gamma - 1)(rho u - p_inf), which has an exact Riemann solution."""
+def is_gamma_law(eos: EquationOfState) -> bool:
+    """Return whether P + p_inf = (gamma - 1)(rho u - p_inf), as `sph.exact.riemann` requires."""
     return hasattr(eos, "gamma") and hasattr(eos, "p_inf")
 
 
-def is_ideal(eos) -> bool:
-    """Whether P = (gamma - 1) rho u."""
+def is_ideal(eos: Any) -> bool:
+    """Return whether P = (gamma - 1) rho u."""
     return is_gamma_law(eos) and eos.p_inf == 0.0
 
 
-def make(name: str, **parameters):
-    """The equation of state of that name, e.g. make("ideal_gas", gamma=1.4)."""
+def make(name: str, **parameters: Any) -> EquationOfState:
+    """Return the equation of state of that name, e.g. make("ideal_gas", gamma=1.4)."""
     return registry.model_class("sph.eos", name)(**parameters)

@@ -1,16 +1,20 @@
-"""Ideal gas of constant adiabatic index (seed eqs 19-20)."""
+"""Ideal gas of constant adiabatic index (eqs 19-20)."""
 
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
 
+from sph.eos import Defaults
+from sph.model import Parameter, model
 
+
+@model(Defaults)
 class IdealGas(NamedTuple):
     """`gamma`: adiabatic index, the ratio of specific heats, above 1."""
 
-    gamma: float
+    gamma: Annotated[float, Parameter("adiabatic index, the ratio of specific heats", above=1.0)]
 
-    p_inf = 0.0  # no parameter: what a stiffened gas has
+    p_inf = 0.0  # not a parameter: the value of a stiffened gas that is ideal
 
     def pressure(self, density, internal_energy):
         return (self.gamma - 1.0) * density * internal_energy  # eq 19

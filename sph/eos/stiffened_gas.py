@@ -1,23 +1,27 @@
-"""Stiffened gas: a liquid or solid under shocks, as an ideal gas whose pressure is offset.
+"""Stiffened gas: an ideal gas with a pressure offset, for liquids and solids under shocks.
 
-Harlow & Amsden (1971), LANL report LA-4700: P = (gamma - 1) rho u - gamma p_inf. In P + p_inf it is
-an ideal gas: the same sound speed, isentropes and shocks. Water is near gamma = 4.4,
-p_inf = 6e8 Pa.
+Harlow & Amsden (1971), LANL report LA-4700: P = (gamma - 1) rho u - gamma p_inf. Sound speed,
+isentropes and shocks are those of an ideal gas with pressure P + p_inf. Water has about gamma = 4.4
+and p_inf = 6e8 Pa.
 """
 
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
 
+from sph.eos import Defaults
+from sph.model import Parameter, model
 
+
+@model(Defaults)
 class StiffenedGas(NamedTuple):
-    """`gamma` above 1; `p_inf`, a pressure, at least 0: the gas holds together down to -p_inf.
+    """`gamma`: above 1; `p_inf`: at least 0, a pressure; the gas sustains tension down to -p_inf.
 
-    u is positive well before that: the bound is u > p_inf/rho, where P = -p_inf and sound stops.
+    The lowest u is p_inf/rho, where P = -p_inf and the sound speed is 0.
     """
 
-    gamma: float
-    p_inf: float
+    gamma: Annotated[float, Parameter("the ratio of specific heats of the gas", above=1.0)]
+    p_inf: Annotated[float, Parameter("pressure that holds the gas together", at_least=0.0)]
 
     def pressure(self, density, internal_energy):
         return (self.gamma - 1.0) * density * internal_energy - self.gamma * self.p_inf

@@ -1,1 +1,1 @@
-"""Exact solutions to compare with: one file each, functions of NumPy arrays in code units."""
+"""Exact and reference solutions, one file each: functions of NumPy arrays in code units."""

@@ -1,24 +1,25 @@
-"""Free expansion of an isentropic ball of gas that stays similar to itself.
+"""Self-similar free expansion of an isentropic ball of gas.
 
 Ovsyannikov (1956), Dokl. Akad. Nauk SSSR 111, 47; Dyson (1968), J. Math. Mech. 18, 91. In a gas of
-density rho_c (R_0/R)^D (1 - r^2/R^2)^(1/(gamma - 1)) with P = K rho^gamma, pressure accelerates in
-proportion to r. So v = r dR/dt / R for ever, and the radius is all there is to solve for.
+density rho_c (R_0/R)^D (1 - r^2/R^2)^(1/(gamma - 1)) with P = K rho^gamma, the acceleration is
+proportional to r. So v = r dR/dt / R at all times, and only R(t) remains to be solved for.
 """
 
 import numpy as np
 
 
 def radius(time: float, start: float, sound_speed: float, gamma: float, dimension: int):
-    """Radius R and its rate dR/dt at `time`, from rest at radius `start`.
+    """Return the radius R and dR/dt at `time`, for an expansion from rest at radius `start`.
 
-    sound_speed: at the centre at t = 0. d2R/dt2 = 2 c^2/(gamma - 1) (R_0/R)^(D (gamma - 1)) / R.
+    sound_speed: c at the centre at t = 0. Solves
+    d2R/dt2 = 2 c^2/(gamma - 1) (R_0/R)^(D (gamma - 1)) / R.
     """
     from scipy.integrate import solve_ivp  # costs 0.2 s to import
 
     exponent = dimension * (gamma - 1.0)
 
     def rates(_, state):
-        # in units of the first radius and of the time in which sound crosses it
+        # in units of the initial radius and its sound crossing time
         return state[1], 2.0 / (gamma - 1.0) * state[0] ** (-exponent - 1.0)
 
     end = time * sound_speed / start
@@ -29,22 +30,22 @@ def radius(time: float, start: float, sound_speed: float, gamma: float, dimensio
 
 
 def kinetic_share(radius: float, start: float, gamma: float, dimension: int) -> float:
-    """What part of the first internal energy has become motion at that radius.
+    """Return the fraction of the initial internal energy that is kinetic energy at `radius`.
 
-    The rest of it does work as entropy stays: u ~ rho^(gamma - 1) ~ R^(-D (gamma - 1)).
+    The gas is isentropic, so u ~ rho^(gamma - 1) ~ R^(-D (gamma - 1)).
     """
     return 1.0 - (start / radius) ** (dimension * (gamma - 1.0))
 
 
 def radius_of_mass(share: np.ndarray, gamma: float, dimension: int) -> np.ndarray:
-    """Radii, in units of R, that hold the parts `share` of the mass."""
+    """Return the radii (N,), in units of R, inside which the mass fraction is `share` (N,)."""
     from scipy.special import betaincinv
 
     return np.sqrt(betaincinv(dimension / 2.0, gamma / (gamma - 1.0), share))
 
 
 def mass(density: float, radius: float, gamma: float, dimension: int) -> float:
-    """Mass of a ball of that radius and central density."""
+    """Return the mass of a ball with that radius and central density."""
     from scipy.special import beta
 
     surface = (2.0, 2.0 * np.pi, 4.0 * np.pi)[dimension - 1]  # of the unit ball

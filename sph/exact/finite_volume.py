@@ -1,10 +1,10 @@
-"""A finite-volume code in 1-D, to compare with where there is no exact solution.
+"""A Lagrangian finite-volume code in 1-D, as reference where no exact solution exists.
 
 MUSCL-Hancock with the star state of HLLC (Toro 2009, Riemann Solvers and Numerical Methods for
 Fluid Dynamics, sections 14.4 and 10.4), the limiter of monotonised central differences (van Leer
 1977) and the outer wave speeds of Einfeldt (1988), SIAM J. Numer. Anal. 25, 294. The cells move
-with the gas, so that contacts stay as sharp as they begin, where a grid at rest smears them ever
-wider. Second order where the flow is smooth, first at shocks.
+with the gas, so contacts stay sharp, which a grid at rest would smear more and more. The method is
+of second order in smooth flow and of first order at shocks.
 """
 
 from typing import NamedTuple
@@ -14,15 +14,15 @@ from numba import njit
 
 from sph.compiled import COMPILED
 
-# What a problem calls its `exact` where that is made here.
+# `Problem.truth` of problems that use this reference.
 TRUTH = ("a finite-volume solution", "finite volumes")
 
-# Share of the time in which sound crosses a cell; faces move less than that
+# Time step in units of the sound crossing time of a cell; faces move less than a cell in it
 COURANT = 0.5
 
 
 class Cells(NamedTuple):
-    """Means over cells, code units: velocity by mass, pressure that of the mean energy."""
+    """Cell averages in code units: mass-weighted velocity, and pressure of the mean energy."""
 
     faces: np.ndarray  # (cells + 1,) ascending
     density: np.ndarray  # (cells,)
@@ -30,29 +30,29 @@ class Cells(NamedTuple):
     pressure: np.ndarray
 
     def at(self, x) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Density, velocity and pressure (N,) at x (N,): linear between centres."""
+        """Return density, velocity and pressure (N,) at x (N,), linear between cell centres."""
         centres = 0.5 * (self.faces[1:] + self.faces[:-1])
         return tuple(np.interp(x, centres, values) for values in self[1:])
 
 
 def evolve(cells: Cells, eos, time: float, walls: tuple[bool, bool]) -> Cells:
-    """The cells a time later.
+    """Return the cells after `time`.
 
-    `eos`: ideal or stiffened gas; `walls`: whether either end is a reflecting wall, or else one
-    that goes with the gas and lets waves out. Raises ValueError for gas without density or
-    pressure.
+    eos: an ideal or stiffened gas; walls: for each end, whether it is a reflecting wall, otherwise
+    it moves with the gas and transmits waves. Raises ValueError if a density or pressure is not
+    positive.
     """
     faces = np.array(cells.faces, dtype=float)
     state = np.array([cells.density, cells.velocity, cells.pressure + eos.p_inf], dtype=float)
     if not (state[0].min() > 0.0 and state[2].min() > 0.0):
-        raise ValueError("density and pressure of every cell must be positive")
+        raise ValueError("expected positive density and pressure in every cell")
     _evolve(faces, state, float(eos.gamma), float(time), *walls)
     return Cells(faces, state[0], state[1], state[2] - eos.p_inf)
 
 
 @njit(**COMPILED)
 def _evolve(faces, state, gamma, time, wall_low, wall_high):
-    """Move faces (n + 1) and state (3, n), density, velocity and pressure, on in place."""
+    """Advance faces (n + 1) and state (3, n), which is density, velocity and pressure, in place."""
     n = state.shape[1]
     mass = (faces[1:] - faces[:-1]) * state[0]
     lower, upper = np.empty((3, n)), np.empty((3, n))  # states on both faces of each cell
@@ -79,7 +79,7 @@ def _evolve(faces, state, gamma, time, wall_low, wall_high):
 
 @njit(**COMPILED)
 def _limited(below, above):
-    """Change over a cell from the differences to its neighbours; 0 at an extremum."""
+    """Return the limited change across a cell, from differences to its neighbours."""
     if below * above <= 0.0:
         return 0.0
     size = min(2.0 * abs(below), 2.0 * abs(above), 0.5 * abs(below + above))
@@ -88,7 +88,7 @@ def _limited(below, above):
 
 @njit(**COMPILED)
 def _neighbour(state, k, i, wall_low, wall_high):
-    """Value k of cell i, also beyond the ends: reflected at a wall, else that of the last cell."""
+    """Return value k of cell i; beyond the ends, the last cell, mirrored at a wall."""
     n = state.shape[1]
     if i < 0:
         return -state[k, 0] if k == 1 and wall_low else state[k, 0]
@@ -99,7 +99,7 @@ def _neighbour(state, k, i, wall_low, wall_high):
 
 @njit(**COMPILED)
 def _reconstruct(faces, state, gamma, dt, wall_low, wall_high, lower, upper):
-    """States on the faces of each cell half a step later (Toro eqs 14.42-14.43, along the gas)."""
+    """Set the states at cell faces after half a step (Toro eqs 14.42-14.43, Lagrangian)."""
     change = np.empty(3)
     for i in range(state.shape[1]):
         density, velocity, pressure = state[0, i], state[1, i], state[2, i]
@@ -111,7 +111,7 @@ def _reconstruct(faces, state, gamma, dt, wall_low, wall_high, lower, upper):
         density -= half * state[0, i] * change[1]
         velocity -= half * change[2] / state[0, i]
         pressure -= half * gamma * state[2, i] * change[1]
-        # where expansion would empty the cell in half a step: first order
+        # first order where expansion would empty the cell within half a step
         if density <= 0.5 * abs(change[0]) or pressure <= 0.5 * abs(change[2]):
             density, velocity, pressure = state[0, i], state[1, i], state[2, i]
             change[:] = 0.0
@@ -123,7 +123,7 @@ def _reconstruct(faces, state, gamma, dt, wall_low, wall_high, lower, upper):
 
 @njit(**COMPILED)
 def _solve_faces(lower, upper, gamma, wall_low, wall_high, speed, push):
-    """Velocity and pressure of the contact at each face by HLLC (Toro eqs 10.36-10.37)."""
+    """Set velocity and pressure of the contact at each face by HLLC (Toro eqs 10.36-10.37)."""
     n = lower.shape[1]
     for face in range(n + 1):
         if face == 0:
@@ -136,7 +136,7 @@ def _solve_faces(lower, upper, gamma, wall_low, wall_high, speed, push):
             else:
                 rho_R, v_R, P_R = lower[0, face], lower[1, face], lower[2, face]
         c_L, c_R = np.sqrt(gamma * P_L / rho_L), np.sqrt(gamma * P_R / rho_R)
-        # Einfeldt: the means of Roe, and a share of the velocity's jump
+        # Einfeldt: Roe averages, and a part of the jump of velocity
         w_L, w_R = np.sqrt(rho_L), np.sqrt(rho_R)
         mean = (w_L * v_L + w_R * v_R) / (w_L + w_R)
         spread = (w_L * c_L**2 + w_R * c_R**2) / (w_L + w_R)

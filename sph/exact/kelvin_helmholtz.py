@@ -1,27 +1,26 @@
-"""Linear theory of a compressible shear layer: growth rates, and how any small disturbance evolves.
+"""Linear theory of a compressible shear layer: growth rates and the evolution of perturbations.
 
-About a stream U(y) along x of density R(y) at one pressure, a disturbance (u, v, p)(y, t) e^(ikx)
-of velocity and pressure obeys the linearised Euler equations of an adiabatic gas,
+A perturbation (u, v, p)(y, t) e^(ikx) of velocity and pressure, in a stream U(y) along x of density
+R(y) at uniform pressure, obeys the linearised Euler equations of an adiabatic gas,
 
     du/dt = -ik U u - U' v - ik p/R
     dv/dt = -ik U v - p'/R
     dp/dt = -ik U p - R c^2 (ik u + v')
 
-(Drazin & Reid 2004, Hydrodynamic Stability, section 22, with compression kept), which the
-disturbance of density does not enter. y is periodic and derivatives are those of the Fourier series
-through the points.
+(Drazin & Reid 2004, Hydrodynamic Stability, section 22, with compression), which do not contain the
+perturbation of density. y is periodic, and derivatives are spectral (Fourier).
 """
 
 from typing import NamedTuple
 
 import numpy as np
 
-# Relative to the disturbance: far below what any simulation is compared to.
+# Relative to the perturbation, and far below the errors of simulations.
 TOLERANCE = 1e-7
 
 
 class ShearLayer(NamedTuple):
-    """A stream along x at n points of one period in y, evenly spaced."""
+    """A stream along x, given at n evenly spaced points of one period in y."""
 
     period: float
     velocity: np.ndarray  # (n,) U along x
@@ -30,12 +29,12 @@ class ShearLayer(NamedTuple):
 
 
 def points(period: float, n: int) -> np.ndarray:
-    """(n,) places in y at which a `ShearLayer` gives its values."""
+    """Return the (n,) points in y of a `ShearLayer`."""
     return period * (np.arange(n) + 0.5) / n
 
 
 def growth_rate(layer: ShearLayer, wavenumber: float) -> float:
-    """Growth rate of the fastest mode e^(ikx): the largest real part of the eigenvalues."""
+    """Return the growth rate of the fastest mode e^(ikx), the largest real part of eigenvalues."""
     from scipy.linalg import eigvals  # costs 0.1 s to import
 
     n = layer.velocity.size
@@ -45,7 +44,7 @@ def growth_rate(layer: ShearLayer, wavenumber: float) -> float:
 
 
 def evolution(layer: ShearLayer, wavenumber: float, start, times: np.ndarray) -> np.ndarray:
-    """Disturbance (M, 3, n) of u, v and p at `times` (M,), in rising order, from `start` (3, n)."""
+    """Return perturbations (M, 3, n) of u, v, p at ascending `times` (M,), from `start` (3, n)."""
     from scipy.integrate import solve_ivp
 
     if times[-1] == 0.0:
@@ -60,8 +59,7 @@ def evolution(layer: ShearLayer, wavenumber: float, start, times: np.ndarray) ->
 
 
 def vortex_sheet(wavenumber: float, velocities, densities) -> float:
-    """Growth rate between two incompressible streams that meet at a jump.
-
+    """Return the growth rate of a vortex sheet between two incompressible streams.
     k |U_1 - U_2| sqrt(R_1 R_2)/(R_1 + R_2) (Drazin & Reid 2004, eq 4.20 without gravity).
     """
     (first, second), (light, heavy) = velocities, densities
@@ -69,14 +67,14 @@ def vortex_sheet(wavenumber: float, velocities, densities) -> float:
 
 
 def _rates(layer: ShearLayer, k: float):
-    """The right-hand side as a function of a disturbance (3, n) or of many, (3, n, M)."""
+    """Return the right-hand side, a function of one perturbation (3, n) or of many (3, n, M)."""
     n = layer.velocity.size
     wave = 2j * np.pi * np.fft.fftfreq(n, layer.period / n)
     if n % 2 == 0:
-        wave[n // 2] = 0.0  # a cosine that is sampled at its crests has no slope there
+        wave[n // 2] = 0.0  # the derivative of the Nyquist mode vanishes at the points
 
     def derive(fields):
-        """Derivative along the second axis of (F, n, ...) by the Fourier series."""
+        """Return the spectral derivative along the second axis of (F, n, ...)."""
         along = wave.reshape(-1, *(1,) * (fields.ndim - 2))
         return np.fft.ifft(along * np.fft.fft(fields, axis=1), axis=1)
 

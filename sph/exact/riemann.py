@@ -1,15 +1,15 @@
 """Exact Riemann problem of an ideal or stiffened gas, vacuum included.
 
 Reference: Toro, Riemann Solvers and Numerical Methods for Fluid Dynamics (2009), chapter 4.
-Two half-spaces of gas meet at x = 0 when t = 0; everything after depends on xi = x/t only. From
-left to right: undisturbed gas, a shock or a fan, star state, contact, star state, a shock or a fan,
-undisturbed gas. Where the gases part faster than they can expand, vacuum opens in the middle.
+Two half-spaces of gas meet at x = 0 at t = 0; the solution depends only on xi = x/t. From left to
+right: undisturbed gas, a shock or rarefaction fan, star state, contact, star state, a shock or fan,
+undisturbed gas. If the gases separate faster than they can expand, vacuum opens between them.
 
-A state of density 0 (and pressure 0) is vacuum; pressure 0 at a density above 0 is cold gas.
+A state of density 0 (and pressure 0) is vacuum; pressure 0 at positive density is cold gas.
 
 `eos` is an equation of state with `gamma` and `p_inf`. A stiffened gas is an ideal one in P + p_inf
-(Menikoff & Plohr 1989, Rev. Mod. Phys. 61, 75): inside, pressure stands for that sum, and outside
-its lowest value, cold gas or vacuum, is -p_inf.
+(Menikoff & Plohr 1989, Rev. Mod. Phys. 61, 75). Private functions use that sum as pressure; in
+public functions the lowest pressure, of cold gas or vacuum, is -p_inf.
 """
 
 import math
@@ -27,13 +27,13 @@ from sph.exact.riemann_waves import (
     velocity_change,
 )
 
-# A wave that changes the pressure ahead by less than this part of it is none: states given in three
-# digits leave such waves (4e-4 in the slow shock of the stress suite), and round-off weaker ones.
+# Relative change of pressure below which a wave is ignored: states rounded to three digits produce
+# such waves (4e-4 in the slow shock of the stress suite), and round-off produces weaker ones.
 FAINT = 1e-3
 
 
 class Star(NamedTuple):
-    """Between the outer waves; with `vacuum`, `velocity` is the middle of the vacuum's edges."""
+    """State between the outer waves. With `vacuum`, `velocity` is the mean of its two edges."""
 
     pressure: float
     velocity: float
@@ -43,10 +43,10 @@ class Star(NamedTuple):
 
 
 class WaveSpeeds(NamedTuple):
-    """x/t of every wave, ascending, so that the star states are the plateaus beside `contact`.
+    """Velocities x/t of the waves, ascending. The star states are on both sides of `contact`.
 
-    A fan lies between head and tail, which are equal for a shock. Where there is vacuum (opened or
-    given) the tails are its edges.
+    A fan extends from head to tail, which are equal for a shock. The tails are the edges of vacuum,
+    if there is one.
     """
 
     left_head: float
@@ -57,22 +57,22 @@ class WaveSpeeds(NamedTuple):
 
 
 def star_state(left: State, right: State, eos) -> Star:
-    """Pressure, velocity and the two densities between the outer waves.
+    """Return pressure, velocity and the two densities between the outer waves.
 
-    Raises ValueError for a state or a gamma that is no gas, or where both states are vacuum.
+    Raises ValueError for an invalid state or gamma, or if both states are vacuum.
     """
     star = _star_state(*_as_ideal(left, right, eos), eos.gamma)
     return star._replace(pressure=star.pressure - eos.p_inf)
 
 
 def wave_speeds(left: State, right: State, eos) -> WaveSpeeds:
-    """Speeds of both outer waves and the contact. Raises ValueError as `star_state`."""
+    """Return the velocities of all waves. Raises ValueError as `star_state`."""
     left, right = _as_ideal(left, right, eos)
     return _wave_speeds(left, right, _star_state(left, right, eos.gamma), eos.gamma)
 
 
 def reach(left: State, right: State, eos) -> tuple[float, float]:
-    """x/t of the first and the last change of state: a head, or the contact where a wave is FAINT.
+    """Return x/t of the first and last change of state: a head, or the contact if a wave is FAINT.
 
     Raises ValueError as `star_state`.
     """
@@ -88,10 +88,10 @@ def reach(left: State, right: State, eos) -> tuple[float, float]:
 
 
 def solve(left: State, right: State, eos, xi) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Density, velocity and pressure, each (N,), at `xi` (N,) = x/t counted from the diaphragm.
+    """Return density, velocity and pressure, each (N,), at `xi` (N,), x/t from the diaphragm.
 
-    In vacuum, where velocity has no meaning, it is x/t held between the two edges, which makes it
-    continuous. Infinite `xi` gives the undisturbed states. Raises ValueError as `star_state`.
+    In vacuum the velocity is x/t limited to the two edges, which makes the profile continuous.
+    Infinite `xi` gives the undisturbed states. Raises ValueError as `star_state`.
     """
     left, right = _as_ideal(left, right, eos)
     density, velocity, pressure = _solve(left, right, eos.gamma, np.asarray(xi, dtype=float))
@@ -130,7 +130,7 @@ def _solve(left: State, right: State, gamma: float, xi):
 
 
 def _as_ideal(left: State, right: State, eos) -> tuple[State, State]:
-    """The states of the ideal gas that this one is in P + p_inf, checked."""
+    """Return the states with pressure P + p_inf, those of an ideal gas, after checks."""
     if not (math.isfinite(eos.gamma) and eos.gamma > 1.0):
         raise ValueError(f"gamma must be a finite number above 1, not {eos.gamma}")
     left, right = (s._replace(pressure=s.pressure + eos.p_inf) for s in (left, right))
@@ -167,12 +167,12 @@ def _has_vacuum(left: State, right: State, gamma: float) -> bool:
         return True
     fastest = escape_speed(left, gamma) + escape_speed(right, gamma)
     parting = right.velocity - left.velocity
-    # Two cold gases at rest to each other touch without a vacuum: a contact at pressure 0.
+    # Two cold gases with equal velocity touch without vacuum: a contact at pressure 0.
     return parting > fastest or (parting == fastest and fastest > 0.0)
 
 
 def _vacuum_edges(left: State, right: State, gamma: float) -> tuple[float, float]:
-    """Speeds of both edges of the vacuum (Toro section 4.6); equal if one state is vacuum."""
+    """Return the velocities of the vacuum's edges (Toro section 4.6), equal if a side is vacuum."""
     if left.density == 0.0:
         return (right.velocity - escape_speed(right, gamma),) * 2
     edge_left = left.velocity + escape_speed(left, gamma)
@@ -188,7 +188,7 @@ def _wave_speeds(left: State, right: State, star: Star, gamma: float) -> WaveSpe
 
 
 def _left_wave(state: State, star: Star, gamma: float) -> tuple[float, float]:
-    """Speeds of head and tail of the left wave (the right one is its mirror image)."""
+    """Return the velocities of head and tail of the left wave."""
     if state.density == 0.0:  # no wave: the edge of the gas on the other side
         return star.velocity, star.velocity
     if not star.vacuum and star.pressure >= state.pressure:
@@ -198,11 +198,11 @@ def _left_wave(state: State, star: Star, gamma: float) -> tuple[float, float]:
     if star.density_left == 0.0:
         return head, state.velocity + escape_speed(state, gamma)
     tail = star.velocity - math.sqrt(gamma * star.pressure / star.density_left)
-    return head, max(head, tail)  # a fan of no width may be turned over by round-off
+    return head, max(head, tail)  # round-off may reverse a fan of zero width
 
 
 def _left_profile(state: State, star: Star, speed: WaveSpeeds, gamma: float, xi):
-    """Density, velocity, pressure left of the contact: state, fan (Toro eq 4.56), star state."""
+    """Return density, velocity, pressure left of the contact: state, fan (Toro eq 4.56), star."""
     head, tail = speed.left_head, speed.left_tail
     at_star = (star.density_left, star.velocity, star.pressure)
     if head == tail:

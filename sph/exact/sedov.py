@@ -2,14 +2,14 @@
 
 References: Kamm & Timmes 2007 (LA-UR-07-2849), "standard case" with uniform density; Landau &
 Lifshitz, Fluid Mechanics, paragraph 106. A cold gas at rest receives `energy` at the origin at
-t = 0; everything after depends on lambda = r/R only, with R the radius of the shock.
+t = 0. The solution depends only on lambda = r/R, with R the radius of the shock.
 
 The closed-form interior has one parameter. Here it is y = x2 of Kamm & Timmes, from 0 at the
-centre to 1 at the shock, in which the other factors are free of cancellation. Their exponents
-diverge at gamma = 2, where x3 = x4: `_interior` writes the product so that it stays finite there.
+centre to 1 at the shock, for which the other factors have no cancellation. Their exponents diverge
+at gamma = 2, where x3 = x4; `_interior` writes the product so that it stays finite.
 
-`energy` is that of the whole explosion: per area in 1-D (both sides), per length in 2-D.
-All quantities in code units; `radius` is |x| in 1-D.
+`energy` is the total energy: per area in 1-D (both sides), per length in 2-D. All quantities are in
+code units; `radius` is |x| in 1-D.
 """
 
 import math
@@ -18,15 +18,15 @@ from typing import NamedTuple
 
 import numpy as np
 
-# The smallest lambda told apart from the centre, so that its logarithm stays finite.
+# Smaller lambda are treated as this one, so that the logarithm stays finite.
 SMALLEST_LAMBDA = 1e-250
 
-# gamma from which on a blast in 3-D has no gas at its centre, which these formulas do not describe.
+# From this gamma on, a blast in 3-D is hollow at the centre, which these formulas do not describe.
 HOLLOW = 7.0
 
 
 class _Interior(NamedTuple):
-    """At given y: logarithms of lambda and of density over that at the shock, and the rest."""
+    """Profile at given y; density, pressure and velocity are relative to the shock."""
 
     log_lambda: np.ndarray
     log_density: np.ndarray  # g of Kamm & Timmes
@@ -36,7 +36,7 @@ class _Interior(NamedTuple):
 
 
 class _Integrals(NamedTuple):
-    """Integrals over lambda^(D-1) d(lambda) from 0 to 1, fields over their values at the shock."""
+    """Integrals over lambda^(D-1) d(lambda) from 0 to 1 of fields relative to the shock."""
 
     energy: float  # of g f^2 + h
     momentum: float  # of g f
@@ -44,11 +44,10 @@ class _Integrals(NamedTuple):
 
 
 def shock_radius(energy: float, density: float, gamma: float, dimension: int, time: float) -> float:
-    """R = (E t^2 / (a rho))^(1/(D+2)), with a from the energy integral of the exact interior.
+    """Return R = (E t^2 / (a rho))^(1/(D+2)), with a from the energy integral of the interior.
 
-    Raises ValueError for a parameter that is not positive, a gamma that is not above 1, a dimension
-    other than 1, 2 or 3, and for gamma >= HOLLOW in 3-D, where the interior is no longer the
-    standard case (it becomes hollow).
+    Raises ValueError for a parameter that is not positive, gamma <= 1, a dimension other than 1, 2
+    or 3, and gamma >= HOLLOW in 3-D.
     """
     _check(gamma, dimension, energy=energy, density=density, time=time)
     return (energy * time**2 / (_energy_factor(gamma, dimension) * density)) ** (
@@ -65,10 +64,10 @@ def solve(
     dimension: int,
     background_pressure: float = 0.0,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Density, radial velocity and pressure, each (N,), at `radius` (N,) from the origin.
+    """Return density, radial velocity and pressure, each (N,), at `radius` (N,).
 
-    `background_pressure` is only what is returned outside the shock: the solution is that of a cold
-    background. Raises ValueError as `shock_radius`, and for a negative radius.
+    `background_pressure` is the pressure returned ahead of the shock; the solution neglects it.
+    Raises ValueError as `shock_radius`, and for a negative radius.
     """
     radius = np.asarray(radius, dtype=float)
     if np.any(radius < 0.0):
@@ -84,18 +83,21 @@ def solve(
         2.0 / (gamma + 1.0) * shock_speed * inside.velocity * scaled,
         2.0 / (gamma + 1.0) * density * shock_speed**2 * inside.pressure,
     )
-    background = (density, 0.0, background_pressure)
-    return tuple(
-        np.where(radius <= shock, *pair) for pair in zip(interior, background, strict=True)
+    is_inside = radius <= shock
+    return (
+        np.where(is_inside, interior[0], density),
+        np.where(is_inside, interior[1], 0.0),
+        np.where(is_inside, interior[2], background_pressure),
     )
 
 
 def momentum_weighted_radius(
     energy: float, density: float, gamma: float, dimension: int, time: float
 ) -> float:
-    """Integral of rho v_r r dV over integral of rho v_r dV: a radius that noise hardly moves.
+    """Return integral(rho v_r r dV) / integral(rho v_r dV), a radius insensitive to noise.
 
-    Its ratio to `shock_radius` depends on gamma and dimension only. Raises ValueError likewise.
+    Its ratio to the shock radius depends only on gamma and dimension. Raises ValueError as
+    `shock_radius`.
     """
     shock = shock_radius(energy, density, gamma, dimension, time)
     integrals = _integrals(gamma, dimension)
@@ -109,7 +111,7 @@ def _check(gamma: float, dimension: int, **positive: float) -> None:
         raise ValueError(f"gamma must be a finite number above 1, not {gamma}")
     if dimension == 3 and gamma >= HOLLOW:
         raise ValueError(
-            f"in 3-D gamma must be below {HOLLOW:g}, where the blast turns hollow, not {gamma}"
+            f"in 3-D gamma must be below {HOLLOW:g}, above which the blast is hollow, not {gamma}"
         )
     for name, value in positive.items():
         if not (math.isfinite(value) and value > 0.0):
@@ -117,8 +119,7 @@ def _check(gamma: float, dimension: int, **positive: float) -> None:
 
 
 def _interior(log_y: np.ndarray, gamma: float, dimension: int) -> _Interior:
-    """The self-similar profile at ln y (N,), y = x2 from 0 at the centre to 1 at the shock.
-
+    """Return the self-similar profile at ln y (N,), with y from 0 (centre) to 1 (shock).
     With u = V (D+2)/2 (velocity over that of a point at constant lambda) and k as below,
     x1 = u/u2, x4 = (1 - u)/(1 - u2) and x3 = (1 - k u)/(1 - k u2), where u2 is u at the shock.
     """
@@ -157,18 +158,18 @@ def _interior(log_y: np.ndarray, gamma: float, dimension: int) -> _Interior:
 
 
 def _log1p_over(w, epsilon: float):
-    """ln(1 + epsilon w) / epsilon, which is w at epsilon = 0."""
+    """Return ln(1 + epsilon w) / epsilon, and its limit w at epsilon = 0."""
     return np.log1p(epsilon * w) / epsilon if epsilon != 0.0 else w
 
 
 def _log_y(log_lambda: np.ndarray, gamma: float, dimension: int) -> np.ndarray:
-    """ln y (N,) at ln lambda (N,) <= 0: Newton's iteration, halving the bracket where it strays."""
+    """Return ln y (N,) at ln lambda (N,) <= 0: Newton's iteration with bisection as safeguard."""
     high = np.zeros_like(log_lambda)
     exponent = (gamma - 1.0) / (2.0 * (gamma - 1.0) + dimension)
-    # d ln lambda / d ln y is `exponent` at the centre and never half of it nearer the shock
+    # d ln lambda / d ln y is `exponent` at the centre, and above half of that everywhere
     low = 2.0 * log_lambda / exponent
     log_y = np.clip(log_lambda / exponent, low, high)
-    for _ in range(200):  # a guard: 10 are enough unless gamma is close to 7 in 3-D
+    for _ in range(200):  # 10 suffice unless gamma is close to 7 in 3-D
         at = _interior(log_y, gamma, dimension)
         excess = at.log_lambda - log_lambda
         high = np.where(excess >= 0.0, log_y, high)
@@ -183,10 +184,11 @@ def _log_y(log_lambda: np.ndarray, gamma: float, dimension: int) -> np.ndarray:
 
 @cache
 def _integrals(gamma: float, dimension: int) -> _Integrals:
-    """Gauss-Legendre on panels that halve toward the shock, where all is steep at some gamma.
+    """Return the integrals by Gauss-Legendre quadrature on panels that halve toward the shock.
 
-    The variable is z = y^(1/p). lambda^D is y^beta times an analytic function of y, so that with
-    p = m / beta it begins as z^m and y as a power of at least 10: smooth at the centre.
+    The variable is z = y^(1/p). lambda^D is y^beta times an analytic function of y. With
+    p = m / beta, m an integer, lambda^D is z^m times a function of z that is smooth at the centre,
+    where y is a power of z of at least 10.
     """
     beta = dimension * (gamma - 1.0) / (2.0 * (gamma - 1.0) + dimension)
     power = math.ceil(10.0 * beta) / beta
@@ -206,7 +208,7 @@ def _integrals(gamma: float, dimension: int) -> _Integrals:
 
 
 def _energy_factor(gamma: float, dimension: int) -> float:
-    """a = E t^2 / (rho R^(D+2)): kinetic and thermal energy of the interior, integrated."""
+    """Return a = E t^2 / (rho R^(D+2)), from kinetic and internal energy of the interior."""
     sphere = (2.0, 2.0 * math.pi, 4.0 * math.pi)[dimension - 1]
     speed = 2.0 / (dimension + 2)  # of the shock, in R/t
     return sphere * speed**2 * 2.0 / (gamma**2 - 1.0) * _integrals(gamma, dimension).energy

@@ -1,1 +1,1 @@
-"""Time integration: the leapfrog of the seed and its step."""
+"""Time integration: the leapfrog and its time step."""

@@ -1,20 +1,52 @@
-"""Prediction and correction (seed eqs 1-6 and 29-31), in place.
+"""Prediction and correction of the leapfrog (eqs 1-6 and 29-31), in place, of all evolved fields.
 
-Internal energy stays positive by rule. Where half a step of cooling would take more than half of
-u, the straight line u + c is left, with its own value and slope, for u/2 e^(1 + 2 c/u), which never
-reaches zero. That is more energy than the pairs exchanged; the updates return how much, summed over
-particles, and the history shows it. With the step limit u/|du/dt| it is never needed.
+Positive quantities such as internal energy are kept positive. If a change c would take more than
+half of u, u + c is replaced by u/2 e^(1 + 2 c/u), which has the same value and slope at c = -u/2
+and never reaches zero. This adds energy; the functions return its sum over particles, which the
+history records as energy_injected. With the time step limit u/|du/dt| this does not occur.
 """
 
 import numpy as np
 from numba import njit
 
 from sph.compiled import COMPILED
+from sph.part import Evolved, Rule
+from sph.state import State
+
+
+def predict(state: State, evolved: tuple[Evolved, ...], dt: float) -> float:
+    """Advance positions by a full step and all else by half; write full steps to predicted fields.
+
+    Returns the energy added beyond the rates.
+    """
+    s, given = state, 0.0
+    _move(dt, s.position, s.velocity, s.acceleration, s.predicted_velocity)
+    for one in evolved:
+        given += one.rule.predict(
+            dt, getattr(s, one.value), getattr(s, one.rate), s.mass, getattr(s, one.predicted)
+        )
+    return given
+
+
+def correct(state: State, evolved: tuple[Evolved, ...], dt: float) -> float:
+    """Advance by the second half step, with the new rates. Return the energy added beyond them."""
+    s, given = state, 0.0
+    _straight_correct(dt, s.velocity, s.acceleration, s.mass)
+    for one in evolved:
+        given += one.rule.correct(dt, getattr(s, one.value), getattr(s, one.rate), s.mass)
+    return given
+
+
+def keep(state: State, evolved: tuple[Evolved, ...]) -> None:
+    """Set predicted fields to the initial values."""
+    state.predicted_velocity[:] = state.velocity
+    for one in evolved:
+        getattr(state, one.predicted)[:] = getattr(state, one.value)
 
 
 @njit(**COMPILED)
-def predict(dt, position, velocity, acceleration, velocity_full):
-    """Move positions by a full step (eq 1), velocities by half of one (eq 2).
+def _move(dt, position, velocity, acceleration, velocity_full):
+    """Advance positions by a full step (eq 1) and velocities by half a step (eq 2).
 
     velocity_full (D, N) receives the full-step prediction (eq 4).
     """
@@ -29,19 +61,30 @@ def predict(dt, position, velocity, acceleration, velocity_full):
 
 
 @njit(**COMPILED)
-def predict_scalar(dt, value, rate, value_full):
-    """Half a step in place, the full step into value_full: eq 6 and the first of 31."""
-    for i in range(value.size):
-        start = value[i]
-        value_full[i] = start + rate[i] * dt
-        value[i] = start + 0.5 * rate[i] * dt
+def _straight_predict(dt, value, rate, mass, value_full) -> float:
+    """Advance `value` by half a step; write the full step to value_full (eqs 6 and 31)."""
+    flat, flat_rate, flat_full = value.reshape(-1), rate.reshape(-1), value_full.reshape(-1)
+    for i in range(flat.size):
+        start = flat[i]
+        flat_full[i] = start + flat_rate[i] * dt
+        flat[i] = start + 0.5 * flat_rate[i] * dt
+    return 0.0
 
 
 @njit(**COMPILED)
-def predict_energy(dt, energy, rate, mass, energy_full) -> float:
-    """Half a step in place (eq 3), the full step into energy_full (eq 5), both kept positive.
+def _straight_correct(dt, value, rate, mass) -> float:
+    """Advance `value` by the second half step with the new rate (eqs 29 and 31); equal shapes."""
+    flat, flat_rate = value.reshape(-1), rate.reshape(-1)
+    for i in range(flat.size):
+        flat[i] += 0.5 * flat_rate[i] * dt
+    return 0.0
 
-    Returns the energy that the half step was given beyond rate dt/2.
+
+@njit(**COMPILED)
+def _positive_predict(dt, energy, rate, mass, energy_full) -> float:
+    """Advance `energy` by half a step (eq 3); write the full step to energy_full (eq 5).
+
+    Both are kept positive. Returns the energy added to the half step.
     """
     given = 0.0
     for i in range(energy.size):
@@ -52,16 +95,8 @@ def predict_energy(dt, energy, rate, mass, energy_full) -> float:
 
 
 @njit(**COMPILED)
-def correct(dt, value, rate):
-    """The second half step with the new rate, arrays of any one shape (eqs 29 and 31)."""
-    flat, flat_rate = value.reshape(-1), rate.reshape(-1)
-    for i in range(flat.size):
-        flat[i] += 0.5 * flat_rate[i] * dt
-
-
-@njit(**COMPILED)
-def correct_energy(dt, energy, rate, mass) -> float:
-    """The same for the internal energy (eq 30), kept positive; returns the energy given."""
+def _positive_correct(dt, energy, rate, mass) -> float:
+    """Advance `energy` by the second half step (eq 30), kept positive; return the energy added."""
     given = 0.0
     for i in range(energy.size):
         energy[i], extra = _kept_positive(energy[i], 0.5 * rate[i] * dt)
@@ -71,10 +106,14 @@ def correct_energy(dt, energy, rate, mass) -> float:
 
 @njit(**COMPILED, forceinline=True)
 def _kept_positive(energy, change):
-    """(u + change kept positive, what that added)."""
-    # in this order a number that is not one passes through, for the watchdog to find
+    """Return u + change kept positive, and the energy that this added."""
+    # the order of this comparison lets NaN pass, for the watchdog to find
     if change < -0.5 * energy:
-        # from u = 0 there is nothing to take, and -inf gives e^-inf = 0
+        # u = 0 gives change/energy = -inf and e^-inf = 0
         kept = 0.5 * energy * np.exp(1.0 + 2.0 * change / energy)
         return kept, kept - (energy + change)
     return energy + change, 0.0
+
+
+STRAIGHT = Rule(_straight_predict, _straight_correct)
+POSITIVE = Rule(_positive_predict, _positive_correct)

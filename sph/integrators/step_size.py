@@ -1,15 +1,15 @@
-"""The global time step (seed eq 32), what else bounds it, and the particle that sets it.
+"""The global time step: eq 32, further limits, and the particle that sets it.
 
-Each bound that eq 32 lacks, and why:
+Limits other than eq 32, and why they are needed:
 
-- "support", "growth". v_sig counts approach alone; gas that parts fast could lose its neighbours in
-  one step. A support may change by SUPPORT_CHANGE of itself: by dH/dt = H div v/D where the scene
-  has the divergence, else as far as it changed in the last step. A step may be GROWTH times as long
-  as the one before, so that a flow that has just been stiff is not left in one leap.
-- "acceleration". An external field bounds the step by C (H/|a|)^(1/2).
-- "approach". v_sig counts neighbours alone; gas that is still apart may overlap in one step. Such a
-  pair may come 2C/3 of H deep, as far as eq 32 lets neighbours approach (neighbours/approach.py).
-- "viscosity", "conductivity". Both damp differences between neighbours, at a rate lambda. With
+- "support", "growth". Eq 32 ignores expansion, in which gas could lose its neighbours within one
+  step. The relative change of a support radius is at most SUPPORT_CHANGE, predicted by
+  dH/dt = H div v/D if div v is computed, otherwise by its last change. A step is at most GROWTH
+  times as long as the previous one, so that short steps do not become long at once.
+- "acceleration". A force that is not in the signal speed limits the step to C (H/|a|)^(1/2).
+- "approach". Eq 32 considers only neighbours; gas that is still apart could overlap in one step.
+  Such a pair may penetrate by 2C/3 of H, as eq 32 allows neighbours (neighbours/approach.py).
+- Terms that damp differences between neighbours, at a rate lambda, limit C itself. With
   a = -w^2 x - lambda v, where a takes the predicted v of eq 4, one step maps
   (x, v dt, a dt^2) -> x' = x + v dt + a dt^2/2, a' dt^2 = -(w dt)^2 x' - lambda dt (v dt + a dt^2),
   v' = v + (a + a') dt/2. At the limit of stability the map has the eigenvalue -1, which makes v = 0
@@ -18,15 +18,15 @@ Each bound that eq 32 lacks, and why:
       lambda dt + (w dt)^2 / 4 < 1.
 
   With lambda = alpha v_sig/H and w = 2 v_sig/H a step of C 2H/v_sig is stable while
-  2 alpha C + 4 C^2 < 1, and C is held there. (Eq 24 damps velocities that alternate along a line of
-  particles H/2.6 apart by 0.84 alpha v_sig/H; what is left is for other kernels and for approach,
-  which doubles lambda where v_sig is mostly w_ij.) alpha is the largest that the switch allows: it
-  may rise to that within a step. The conductivity's strength times C is held to CONDUCTIVITY. What
-  was measured is in docs/measurements.md, "Time step and viscosity".
+  2 alpha C + 4 C^2 < 1, and C is reduced to that. (Eq 24 damps velocities that alternate along a
+  line of particles H/2.6 apart at 0.84 alpha v_sig/H. The margin is for other kernels and for
+  approach, which doubles lambda if v_sig is mostly w_ij.) alpha is the largest that the switch
+  allows, since alpha may rise to it within a step. Each part gives its limit
+  (`Part.largest_courant`). Measurements: docs/measurements.md, "Time step and viscosity".
+- A part may limit the step of each particle (`Part.step_limit`).
 - "end". No step is longer than the run.
 """
 
-import math
 from typing import NamedTuple
 
 import numpy as np
@@ -34,22 +34,18 @@ from numba import njit
 
 from sph.compiled import COMPILED
 from sph.neighbours.approach import first_contact
+from sph.part import Part
+from sph.state import State
 
-CRITERIA = (
-    "signal_speed", "energy", "acceleration", "support", "growth", "end", "viscosity",
-    "conductivity", "approach",
-)  # fmt: skip
+# Criteria of every scene; those of parts have the names of the parts.
+CRITERIA = ("signal_speed", "energy", "acceleration", "support", "growth", "end", "approach")
 
 SUPPORT_CHANGE = 0.2
 GROWTH = 1.5
-CONDUCTIVITY = 1.5
 
 
 class StepLimit(NamedTuple):
-    """The step that the criteria allow, the ID of the particle that sets it, and by which.
-
-    The particle is 0 where none does: "growth" and "end".
-    """
+    """The allowed step, the ID of the particle that limits it (0: none), and the criterion."""
 
     dt: float
     particle: int
@@ -57,36 +53,21 @@ class StepLimit(NamedTuple):
 
 
 class Bounds(NamedTuple):
-    """Of a run: the Courant number C, whether u/|du/dt| and |a| bound the step, and its end.
-
-    Beside them the largest alpha of the viscosity and the strength of the conductivity.
-    """
+    """Limits of a run: Courant number in use (at most C) and its criterion, whether u/|du/dt| and
+    |a| limit the step, and the end time."""
 
     courant: float
+    criterion: str
     energy: bool
     acceleration: bool
     end: float
-    alpha: float = 0.0
-    conductivity: float = 0.0
-
-    @property
-    def held(self) -> tuple[float, str]:
-        """The Courant number that the run takes, C or less, and the criterion of its signals."""
-        held, criterion = self.courant, "signal_speed"
-        stable = 1.0 / (self.alpha + math.hypot(2.0, self.alpha))  # 2 alpha C + 4 C^2 = 1
-        if stable < held:
-            held, criterion = stable, "viscosity" if self.alpha > 2.0 * stable else criterion
-        if self.conductivity * held > CONDUCTIVITY:
-            held, criterion = CONDUCTIVITY / self.conductivity, "conductivity"
-        return held, criterion
 
 
 class Past(NamedTuple):
-    """The step just made: its length, the limit it was cut from, and H (N,) before it."""
+    """The last step: its length, and the limit before it was cut for output."""
 
     dt: float
     limit: float
-    support: np.ndarray
 
 
 @njit(**COMPILED)
@@ -98,7 +79,7 @@ def _smallest(support, signal_speed, energy, energy_rate, acceleration, identity
         by_signal = 2.0 * support[i] / signal_speed[i]
         if by_signal < best or (by_signal == best and identity[i] < particle):
             best, particle, criterion = by_signal, identity[i], 0
-        # cold gas without any energy has none to lose, and heating it is no matter of accuracy
+        # u = 0 does not limit the step: it cannot fall, and any heating is relatively large
         if energy_limit and energy[i] > 0.0:
             by_energy = energy[i] / abs(energy_rate[i])
             if by_energy < best or (by_energy == best and identity[i] < particle):
@@ -115,7 +96,7 @@ def _smallest(support, signal_speed, energy, energy_rate, acceleration, identity
 
 @njit(**COMPILED)
 def _largest_change(support, before, identity):
-    """Largest |H/H_before - 1| or its inverse, and whose it is."""
+    """Return the largest relative change of H in either direction, and the particle's ID."""
     largest = 0.0
     particle = 0
     for i in range(support.size):
@@ -127,7 +108,7 @@ def _largest_change(support, before, identity):
 
 @njit(**COMPILED)
 def _fastest_change(divergence, identity):
-    """Largest |div v|, and whose it is."""
+    """Return the largest |div v|, and the particle's ID."""
     largest = 0.0
     particle = 0
     for i in range(divergence.size):
@@ -137,19 +118,20 @@ def _fastest_change(divergence, identity):
     return largest, particle
 
 
-def limit(bounds: Bounds, particles, signal_speed, divergence, past: Past | None) -> StepLimit:
-    """The coming step; signal_speed (N,) is each particle's largest v_sig.
-
-    divergence (N,) of velocity, None in scenes without; no past at the start.
-    """
-    p = particles
-    courant, by_signals = bounds.held
-    dt, particle, criterion = _smallest(
-        p.support, signal_speed, p.internal_energy, p.energy_rate,
-        p.acceleration if bounds.acceleration else None, p.id, bounds.energy,
+def limit(bounds: Bounds, state: State, parts: tuple[Part, ...], past: Past | None) -> StepLimit:
+    """Return the next step; past: None at the start."""
+    s = state
+    dt, particle, index = _smallest(
+        s.support, s.signal_speed, s.internal_energy, s.energy_rate,
+        s.acceleration if bounds.acceleration else None, s.id, bounds.energy,
     )  # fmt: skip
-    dt, criterion = courant * dt, CRITERIA[criterion] if criterion else by_signals
-    rate, changed = _rate_of_supports(p, divergence, past)
+    dt, criterion = bounds.courant * dt, CRITERIA[index] if index else bounds.criterion
+    for part in parts:
+        times = part.step_limit(s)
+        if times is not None and times.min() < dt:
+            dt, criterion = float(times.min()), part.name
+            particle = s.id[times == dt].min()
+    rate, changed = _rate_of_supports(s, past)
     if rate * dt > SUPPORT_CHANGE:
         dt, particle, criterion = SUPPORT_CHANGE / rate, changed, "support"
     if past is not None and dt > GROWTH * past.limit:
@@ -159,24 +141,25 @@ def limit(bounds: Bounds, particles, signal_speed, divergence, past: Past | None
     return StepLimit(dt, int(particle), criterion)
 
 
-def before_contact(limit: StepLimit, bounds: Bounds, particles, domain) -> StepLimit:
-    """`limit`, cut where particles that are no neighbours yet would meet too deep in that step."""
+def before_contact(limit: StepLimit, bounds: Bounds, particles: State, domain) -> StepLimit:
+    """Return `limit`, reduced if particles that are not neighbours yet would meet within it."""
     p = particles
     part, particle = first_contact(
         p.position, p.velocity, p.acceleration, p.support, p.id, domain.images,
-        domain.longest_reach, limit.dt, 2.0 / 3.0 * bounds.held[0],
+        domain.longest_reach, limit.dt, 2.0 / 3.0 * bounds.courant,
     )  # fmt: skip
     return StepLimit(part * limit.dt, int(particle), "approach") if part < 1.0 else limit
 
 
-def _rate_of_supports(particles, divergence, past: Past | None) -> tuple[float, int]:
-    """Largest |dH/dt|/H, and whose it is."""
+def _rate_of_supports(state: State, past: Past | None) -> tuple[float, int]:
+    """Return the largest |dH/dt|/H, from div v if available, and the particle's ID."""
+    divergence = state.get("div_v")
     if divergence is not None:
-        rate, particle = _fastest_change(divergence, particles.id)
-        return rate / particles.position.shape[0], particle
+        rate, particle = _fastest_change(divergence, state.id)
+        return rate / state.dimension, particle
     if past is None:
         return 0.0, 0
-    change, particle = _largest_change(particles.support, past.support, particles.id)
-    # less than this cannot become too much in one step; it may be the iteration of H, which goes on
-    # however short the step
+    change, particle = _largest_change(state.support, state.support_before, state.id)
+    # smaller changes cannot exceed SUPPORT_CHANGE in a step; they may come from the iteration of H,
+    # which continues in steps of any length
     return (change / past.dt if change > SUPPORT_CHANGE / GROWTH else 0.0), particle

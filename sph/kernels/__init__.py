@@ -1,48 +1,75 @@
-"""Smoothing kernels: W(r, H) = H^-D w(r/H) with compact support r < H (seed eq 9).
+"""Smoothing kernels: W(r, H) = H^-D w(r/H), zero for r >= H, the support radius (eq 9)."""
 
-A kernel is a file that holds a NamedTuple with these methods, all free of branches so that
-the pair loop vectorises. `dim` is any tuple of length D, `q` = r/H >= 0; w and its derivative come
-without the normalisation C, which a loop applies once a particle.
-
-    normalisation(dim)      C, such that the integral of C w over space is 1
-    w(dim, q)               w(q) / C, zero for q >= 1
-    dw_over_q(dim, q)       (dw/dq) / (q C): finite at q = 0 where the kernel is smooth
-    force_over_q(dim, q)    the same, as it enters the pair force (eqs 22-23)
-
-and, where its particles pair at large eta, the attribute `pairs_above`: by dimension, the largest
-eta at which the particles of uniform gas stay apart (docs/measurements.md, section "Pairing").
-"""
+import functools
+from collections.abc import Mapping
+from types import MappingProxyType
+from typing import Any, Protocol
 
 import numpy as np
 
 from sph import registry
 from sph.compiled import verb
+from sph.model import Model
+
+Dim = tuple[int, ...]  # any tuple of length D: the number of dimensions
+
+
+class Kernel(Protocol):
+    """A kernel: a file with a NamedTuple that has these methods.
+
+    They have no branches, so that the pair loop vectorises. q = r/H >= 0, a number in compiled code
+    and an array of any shape elsewhere. w and its derivative come without the normalisation C,
+    which a loop applies once a particle.
+
+    """
+
+    def normalisation(self, dim: Dim) -> float:
+        """C, such that the integral of C w over space is 1."""
+
+    def w(self, dim: Dim, q: Any) -> Any:
+        """w(q) / C, zero for q >= 1."""
+
+    def dw_over_q(self, dim: Dim, q: Any) -> Any:
+        """(dw/dq) / (q C): finite at q = 0 where the kernel is smooth."""
+
+    def force_over_q(self, dim: Dim, q: Any) -> Any:
+        """The same, as it enters the pair force (eqs 22-23)."""
+
+
+class Defaults(Model):
+    """What a kernel's file may leave out."""
+
+    flattened: bool = False  # whether the force keeps the gradient near the centre
+    # By dimension, the largest eta at which the particles of uniform gas stay apart
+    # (docs/measurements.md, section "Pairing").
+    pairs_above: Mapping[int, float] = MappingProxyType({})
 
 
 @verb
-def normalisation(self, dim):
+def normalisation(self: Kernel, dim: Dim) -> float:
     return self.normalisation(dim)
 
 
 @verb
-def w(self, dim, q):
+def w(self: Kernel, dim: Dim, q: Any) -> Any:
     return self.w(dim, q)
 
 
 @verb
-def dw_over_q(self, dim, q):
+def dw_over_q(self: Kernel, dim: Dim, q: Any) -> Any:
     return self.dw_over_q(dim, q)
 
 
 @verb
-def force_over_q(self, dim, q):
+def force_over_q(self: Kernel, dim: Dim, q: Any) -> Any:
     return self.force_over_q(dim, q)
 
 
-def support_ratio(kernel, dimension: int) -> float:
-    """H/h = 1/(2 sigma), sigma the kernel's standard deviation per axis (Dehnen & Aly 2012)."""
+@functools.lru_cache(64, typed=True)  # typed: kernels of two classes may hold equal parameters
+def support_ratio(kernel: Kernel, dimension: int) -> float:
+    """Return H/h = 1/(2 sigma), with sigma the kernel's standard deviation (Dehnen & Aly 2012)."""
     dim = (0,) * dimension
-    # Gauss's rule is exact for the polynomials that a kernel is made of, joined at sixths.
+    # Gauss-Legendre quadrature is exact, since kernels are polynomials between multiples of 1/6.
     node, weight = np.polynomial.legendre.leggauss(20)
     q = ((node + 1) / 2 + np.arange(6)[:, None]).ravel() / 6
     shell = np.tile(weight, 6) * q ** (dimension - 1) * kernel.w(dim, q)
@@ -50,6 +77,6 @@ def support_ratio(kernel, dimension: int) -> float:
     return float(1 / (2 * np.sqrt(variance)))
 
 
-def make(name: str, **parameters):
-    """The kernel of that name, e.g. make("cubic_spline", flattened=True)."""
+def make(name: str, **parameters: Any) -> Kernel:
+    """Return the kernel of that name, e.g. make("cubic_spline", flattened=True)."""
     return registry.model_class("sph.kernels", name)(**parameters)

@@ -1,22 +1,25 @@
-"""Cubic spline kernel (appendix of the seed's draft; Monaghan & Lattanzio 1985)."""
+"""Cubic spline kernel (Monaghan & Lattanzio 1985); pairs at large eta."""
 
 import math
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 from sph.compiled import larger
+from sph.kernels import Defaults
+from sph.model import Parameter, model
 
 
+@model(Defaults)
 class CubicSpline(NamedTuple):
-    """`flattened`: in the force, keep the gradient below q = 1/3 at its value there.
+    """`flattened`: in the pair force (eqs 22-23), use the gradient at q = 1/3 for all q below 1/3.
 
-    (Thomas & Couchman 1992: particles at small separation still repel.) It enters eqs 22-23 only.
+    Then close particles still repel each other (Thomas & Couchman 1992).
     """
 
-    flattened: bool = False
+    flattened: Annotated[bool, Parameter("keep the gradient below q = 1/3 in the force")] = False
 
     @property
     def pairs_above(self) -> dict[int, float]:
-        # with the flattened gradient particles stay .77 of a spacing apart at least
+        # with the flattened gradient particles stay at least 0.77 spacings apart
         return {} if self.flattened else {2: 1.4, 3: 1.2}
 
     def normalisation(self, dim):
@@ -42,5 +45,5 @@ class CubicSpline(NamedTuple):
         outer = larger(clipped, 0.0 * q + 0.5)
         u = larger(1.0 - outer, 0.0 * q)
         v = larger(0.5 - clipped, 0.0 * q)
-        # dw/dq at the clipped q, over the true q; 1e-300 only matters where the vector r_ij is zero
+        # dw/dq at the clipped q, over the true q; 1e-300 matters only for coincident particles
         return (-6.0 * u * u / outer - 18.0 * v) * (clipped / larger(q, 0.0 * q + 1e-300))

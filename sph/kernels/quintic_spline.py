@@ -1,6 +1,6 @@
-"""Quintic B-spline kernel (Schoenberg 1946; Morris 1996).
+"""Quintic B-spline kernel (Schoenberg 1946; Morris 1996); pairs at large eta.
 
-It pays in smooth flow, at eta below `pairs_above`.
+Recommended for smooth flow, with eta below `pairs_above`.
 """
 
 import math
@@ -8,8 +8,11 @@ from types import MappingProxyType
 from typing import NamedTuple
 
 from sph.compiled import larger
+from sph.kernels import Defaults
+from sph.model import model
 
 
+@model(Defaults)
 class QuinticSpline(NamedTuple):
     """No parameters."""
 
@@ -28,8 +31,8 @@ class QuinticSpline(NamedTuple):
         return a2 * a2 * a - 6.0 * b2 * b2 * b + 15.0 * c2 * c2 * c
 
     def dw_over_q(self, dim, q):
-        # Outside q = 1/3: -5 [a^4 - 6 b^4] / q. Inside, the polynomial -40/9 + 40 q^2 - 50 q^3: its
-        # value at 1/3 and powers of c, which vanish outside, so nothing is divided by a small q.
+        # For q > 1/3: -5 [a^4 - 6 b^4] / q. For q < 1/3 the polynomial -40/9 + 40 q^2 - 50 q^3,
+        # written as its value at 1/3 plus powers of c, so that nothing is divided by a small q.
         c = larger(1 / 3 - q, 0.0 * q)
         outer = larger(q, 0.0 * q + 1 / 3)
         a = larger(1.0 - outer, 0.0 * q)

@@ -1,11 +1,14 @@
-"""Wendland C2 kernel (seed eqs 11-14; Dehnen & Aly 2012, table 1)."""
+"""Wendland C2 kernel (eqs 11-14; Dehnen & Aly 2012, table 1)."""
 
 import math
 from typing import NamedTuple
 
 from sph.compiled import larger
+from sph.kernels import Defaults
+from sph.model import model
 
 
+@model(Defaults)
 class WendlandC2(NamedTuple):
     """No parameters."""
 

@@ -1,14 +1,17 @@
 """Wendland C4 kernel (Dehnen & Aly 2012, table 1).
 
-It pays with more neighbours than C2 wants (eta about 2.0 and more in 3-D): smoother sums.
+Needs more neighbours than C2 (eta of about 2.0 or more in 3-D) and gives smoother sums.
 """
 
 import math
 from typing import NamedTuple
 
 from sph.compiled import larger
+from sph.kernels import Defaults
+from sph.model import model
 
 
+@model(Defaults)
 class WendlandC4(NamedTuple):
     """No parameters."""
 

@@ -1,14 +1,17 @@
 """Wendland C6 kernel (Dehnen & Aly 2012, table 1).
 
-It pays where errors must be smallest and neighbours may cost (eta about 2.4 and more in 3-D).
+For the smallest errors, with many neighbours (eta of about 2.4 or more in 3-D).
 """
 
 import math
 from typing import NamedTuple
 
 from sph.compiled import larger
+from sph.kernels import Defaults
+from sph.model import model
 
 
+@model(Defaults)
 class WendlandC6(NamedTuple):
     """No parameters."""
 

@@ -1,6 +1,6 @@
-"""Neighbours: particles in blocks, a tree of their boxes, and each block's list of candidates."""
+"""Neighbour search: blocks of particles, a tree of bounding boxes, and candidate lists."""
 
 import math
 
-# Volume of the ball of radius 1 in one, two and three dimensions.
+# Volume of the unit ball in 1-D, 2-D and 3-D.
 BALL = (2.0, math.pi, 4 / 3 * math.pi)

@@ -1,18 +1,20 @@
-"""Particles that are no neighbours yet and would meet within a step, found before it is taken.
+"""Bound on the time step by pairs that are not neighbours yet but would meet within the step.
 
-Eq 32 bounds a step by the approach of neighbours. Cold gas that is still apart has none across the
-gap: it could overlap by whole supports before a pair acts, or be pushed for all of a long step by
-the force that only its end has found. A pair, images included, bounds the step here where its
-straight paths shorten its distance by more than FAR of the smaller support, from outside both
-supports to within the larger. The step then ends at the rim of the support; from close to the rim,
-where eq 32 would let neighbours come in a step. Node pairs of the block tree are dropped where they
-move too little against each other or stay apart: in smooth flow that is the root already.
+Eq 32 bounds a step by the approach of neighbours. Cold streams that are still apart have no
+neighbours across the gap. They could overlap by whole support radii before any pair force acts, or
+be pushed through a long step by a force that is found only at its end. Here a pair, images
+included, bounds the step if its straight paths bring it from outside both supports to within the
+larger and shorten the distance by more than FAR of the smaller. The step then ends at the edge of
+the support or, for pairs that start close to the edge, at the depth that eq 32 allows neighbours
+in a step. Node pairs of the block tree are skipped if their relative motion is small or they stay
+apart; in smooth flow this is true of the root.
 """
 
 import numpy as np
 from numba import njit
 
 from sph.compiled import COMPILED, larger, smaller
+from sph.domain import Images
 from sph.neighbours import tree
 from sph.neighbours.order import BLOCK
 
@@ -20,21 +22,22 @@ FAR = 0.5
 
 SLACK = 1e-9
 
-# Node pairs that wait while one is looked at: each level of the tree leaves two at most, of 27
-# images at the root.
+# Size of the stack of node pairs: each level of the tree leaves two at most, after 27 images at the
+# root.
 STACK = 27 + 4 * 64
 
 
 @njit(**COMPILED)
 def first_contact(
-    position, velocity, acceleration, support, identity, images, box_length, dt, reached
-):
-    """(part of dt, particle): where the step must end for the first such pair, and whose it is.
+    position: np.ndarray, velocity: np.ndarray, acceleration: np.ndarray, support: np.ndarray,
+    identity: np.ndarray, images: Images, box_length: float, dt: float, reached: float,
+) -> tuple[float, int]:  # fmt: skip
+    """Return the fraction of dt at which the step must end, and the ID of a particle of that pair.
 
-    `reached`: how deep, in parts of the smaller support, a pair may come from close to the rim.
-    Position, velocity, acceleration (D, N) and support, identity (N,) in block order; images of the
-    domain, which serve distances up to box_length: a step in which particles move farther against
-    each other is cut to that, for particle 0. (1, 0) where there is no such pair.
+    position, velocity, acceleration: (D, N); support, identity: (N,), all in block order; images:
+    of the domain, valid for distances up to box_length; reached: depth, in units of the smaller
+    support, that a pair starting close to the edge may reach. A step with relative motions above
+    box_length is cut to that, with ID 0. Returns (1, 0) if no pair bounds the step.
     """
     whole = _served(velocity, acceleration, support, images, box_length, dt)
     if not whole > 0.0:
@@ -47,7 +50,7 @@ def first_contact(
 
 @njit(**COMPILED, forceinline=True)
 def _served(velocity, acceleration, support, images, box_length, dt):
-    """The part of dt that images serve; 0 where no pair moves far, which is nearly always."""
+    """Return the fraction of dt for which images are valid; 0 if relative motions are small."""
     D, n = velocity.shape
     least = np.inf
     for i in range(n):
@@ -59,7 +62,7 @@ def _served(velocity, acceleration, support, images, box_length, dt):
             move = dt * (velocity[d, i] + 0.5 * dt * acceleration[d, i])
             low, high = smaller(low, move), larger(high, move)
         apart = high - low
-        if images.sign[:, d].min() < 0.0:  # at a wall moves meet their own images
+        if images.sign[:, d].min() < 0.0:  # at a wall, particles move relative to their images
             apart = max(apart, 2.0 * high, -2.0 * low)
         squared += apart * apart
     apart = np.sqrt(squared)
@@ -70,7 +73,7 @@ def _served(velocity, acceleration, support, images, box_length, dt):
 
 @njit(**COMPILED, forceinline=True)
 def _walk(position, moves, support, identity, images, reached):
-    """The first contact of `first_contact`, as a part of the step that `moves` (D, N) are of."""
+    """Return the first contact as a fraction of the step with displacements `moves` (D, N)."""
     n = support.size
     boxes = tree.build(position, support)
     motion = tree.build(moves, -support)  # whose largest -H is the smallest H
@@ -107,7 +110,7 @@ def _walk(position, moves, support, identity, images, reached):
         near, far = (2 * a + 1, b), (2 * a + 2, b)
         if many_b > many_a:
             near, far = (a, 2 * b + 1), (a, 2 * b + 2)
-        # the pair that may meet first is looked at first: what it finds drops others
+        # the pair that may meet first is examined first, since its result excludes others
         if _earliest(boxes, motion, images, far[0], far[1], image, best) < _earliest(
             boxes, motion, images, near[0], near[1], image, best
         ):
@@ -120,9 +123,9 @@ def _walk(position, moves, support, identity, images, reached):
 
 @njit(**COMPILED)
 def _earliest(boxes, motion, images, a, b, image, best):
-    """A part of the step before which no pair of two nodes makes contact; inf if none by `best`.
+    """Return a fraction of the step before which no pair of two nodes meets; inf if after `best`.
 
-    SLACK makes up for rounding: what is dropped here must not depend on how this was compiled.
+    SLACK allows for rounding, so that the result does not depend on how this was compiled.
     """
     least = -max(motion.support[a], motion.support[b])
     reach = (1.0 + SLACK) * max(boxes.support[a], boxes.support[b])
@@ -146,7 +149,7 @@ def _earliest(boxes, motion, images, a, b, image, best):
 
 @njit(**COMPILED, forceinline=True)
 def _contact(position, moves, support, images, i, j, image, reached):
-    """Where the step must end for i and that image of j, as a part of it; inf if they may meet."""
+    """Return the fraction at which the step must end for i and an image of j; inf if no bound."""
     squared = along = travel = 0.0
     for d in range(position.shape[0]):
         s = images.sign[image, d]
@@ -156,7 +159,7 @@ def _contact(position, moves, support, images, i, j, image, reached):
         along += r * move
         travel += move * move
     H, least = max(support[i], support[j]), min(support[i], support[j])
-    if squared < H * H or not along < 0.0:  # neighbours already, or parting
+    if squared < H * H or not along < 0.0:  # already neighbours, or separating
         return np.inf
     nearest = min(1.0, -along / travel)
     closest = squared + nearest * (2.0 * along + nearest * travel)

@@ -1,4 +1,4 @@
-"""Supports to begin the search of the true ones with, from positions alone."""
+"""Initial guesses of support radii from positions alone."""
 
 import numpy as np
 from numba import njit
@@ -7,11 +7,11 @@ from sph.compiled import COMPILED
 from sph.neighbours import BALL, tree
 from sph.neighbours.order import BLOCK
 
-# Levels of the tree, from the blocks upwards, at which the spacing is read: 8 to 64 particles.
+# Levels of the tree, from blocks upwards, that give a spacing: nodes of 8 to 64 particles.
 GUESS_LEVELS = 4
 
-# Where a guess holds so many times the particles that it is meant to hold, it is halved: lists of
-# them would fill the memory before the true support was found.
+# A guess is halved while it contains this many times the intended number of particles: lists of
+# them would exhaust memory before the support radius is found.
 TOO_MANY = 8.0
 
 HALVINGS = 60
@@ -19,26 +19,26 @@ HALVINGS = 60
 
 @njit(**COMPILED, forceinline=True)
 def _spacing(lower, upper, n):
-    """Spacing s of n particles in a box: s apart along axes, they span prod (e + s) = n s^D."""
+    """Return the spacing s of n particles whose extent is e, from prod(e + s) = n s^D."""
     D = lower.size
     extent = upper - lower
     spacing = extent.max()
-    for _ in range(30):  # a contraction: each pass halves the error at the least
+    for _ in range(30):  # a contraction: each iteration at least halves the error
         spacing = (np.prod(extent + spacing) / n) ** (1 / D)
     return spacing
 
 
 @njit(**COMPILED)
-def from_spacing(position, ratio):
-    """Supports (N,) for positions (D, N) in block order.
+def from_spacing(position: np.ndarray, ratio: float) -> np.ndarray:
+    """Return guesses (N,) for positions (D, N) in block order.
 
-    ratio = (H/h) eta times the least spacing of the boxes that hold the particle. (A box that cuts
-    through planes of a lattice, or a gradient of density, shows too wide a spacing: supports that
-    begin too wide cost lists of many candidates, ones too narrow only a second build.)
+    A guess is ratio = (H/h) eta times the smallest spacing of the tree nodes that contain the
+    particle. (Nodes that cut through lattice planes or a density gradient give too large a spacing.
+    Guesses that are too large cost memory for lists; small ones cost only a second build.)
     """
     n = position.shape[1]
     first, last, lower, upper, _ = tree.build(position, np.zeros(n))
-    # where particles coincide there is no spacing to be seen: begin from a small support
+    # coincident particles have no spacing: begin with a small support radius
     least = 1e-6 * _spacing(lower[0], upper[0], n)
     guess = np.empty(n)
     for leaf in range(first.size):
@@ -48,7 +48,7 @@ def from_spacing(position, ratio):
         node = leaf
         for _ in range(GUESS_LEVELS):
             count = min(last[node] * BLOCK, n) - first[node] * BLOCK
-            if count > 1:  # one particle alone spans nothing
+            if count > 1:  # a single particle has no extent
                 spacing = min(spacing, _spacing(lower[node], upper[node], count))
             node = max(0, (node - 1) // 2)
         guess[first[leaf] * BLOCK : last[leaf] * BLOCK] = ratio * max(spacing, least)
@@ -56,10 +56,10 @@ def from_spacing(position, ratio):
 
 
 @njit(**COMPILED)
-def trim(position, ratio, least, guess):
-    """Halve the guesses (N,) that hold far too many particles, for positions in block order.
+def trim(position: np.ndarray, ratio: float, least: float, guess: np.ndarray) -> None:
+    """Halve guesses (N,) that contain far too many particles, in place; `least` is the lower limit.
 
-    None goes below `least`. A support is meant to hold those of a ball of radius `ratio` spacings.
+    position: (D, N) in block order; the intended number is that in a ball of `ratio` spacings.
     """
     D, n = position.shape
     boxes = tree.build(position, guess)
@@ -82,7 +82,7 @@ def trim(position, ratio, least, guess):
 
 @njit(**COMPILED)
 def _held(boxes, position, centre, radius, enough):
-    """Number of particles in a ball; the count ends where it exceeds `enough`."""
+    """Return the number of particles in a ball, counted until it exceeds `enough`."""
     D, n = position.shape
     held = 0
     stack = np.empty(128, np.int64)

@@ -1,7 +1,7 @@
-"""Candidate lists: for each block, every particle (or image) that may come within a support of it.
+"""Candidate lists: for each block, all particles and images that may become neighbours of it.
 
-A list serves all particles of its block and lives until some particle has moved, or grown its
-support, by its share of the skin. It is stored as one integer a candidate: particle and image.
+A list serves all particles of its block. It is valid until a particle has moved, or its support
+radius has grown, by more than the skin allows. A candidate is one integer: particle and image.
 """
 
 from typing import NamedTuple
@@ -10,10 +10,12 @@ import numpy as np
 from numba import njit
 
 from sph.compiled import COMPILED, larger, smaller
+from sph.domain import Images
 from sph.neighbours.order import BLOCK, number_of_blocks
-from sph.threads import SMALLEST_RANGE
+from sph.neighbours.tree import Tree
+from sph.threads import SMALLEST_RANGE, Team
 
-CHUNK = 32  # blocks that share a stretch of the storage
+CHUNK = 32  # blocks that share a region of the storage
 IMAGE_SHIFT = 26  # low bits of a candidate: the particle; above them the image
 SHORT_IMAGES = 1 << (31 - IMAGE_SHIFT)  # with so many images a candidate fits into 32 bits
 MAX_PARTICLES = 1 << IMAGE_SHIFT
@@ -23,24 +25,24 @@ class Lists(NamedTuple):
     """Candidates of block b: candidates[start[b] : start[b] + count[b]]."""
 
     start: np.ndarray  # (blocks,) int64
-    count: np.ndarray  # (blocks,) int64
+    count: np.ndarray  # type: ignore[assignment]  # (blocks,) int64, not tuple.count
     candidates: np.ndarray  # int32, int64 where supports are wider than a thin box
 
 
 @njit(**COMPILED)
 def _gap(lower_a, upper_a, lower_b, upper_b):
-    """Distance between two intervals, zero where they touch."""
+    """Return the distance between two intervals, 0 if they overlap."""
     return max(0.0, max(lower_b - upper_a, lower_a - upper_b))
 
 
 @njit(**COMPILED, forceinline=True)
 def _fill(chunk, dim, tree, position, support, stretch, images, region, start, count, candidates):
-    """List the blocks of one chunk into its region; return how much room they need."""
+    """Fill the lists of a chunk's blocks into its region; return the room they need."""
     first, last, lower, upper, largest = tree
     sign, offset = images
     begin_of_region = region[chunk]
     room = region[chunk + 1] - begin_of_region
-    D = len(dim)  # a constant to the compiler, which unrolls the loops over it
+    D = len(dim)  # a compile-time constant, so that loops over it are unrolled
     n = support.size
     blocks = start.size
     nodes_on_stack = np.empty(128, np.int64)
@@ -97,7 +99,7 @@ def _fill(chunk, dim, tree, position, support, stretch, images, region, start, c
                     reach = stretch * max(H_block, support[j])
                     if squared >= reach * reach:
                         continue
-                    # Within reach of the box. At its rim: keep it if it is in reach of a particle.
+                    # j is within reach of the block's box. Near its edge, check each particle.
                     nearest = farthest - (stretch * support_least) ** 2
                     if nearest >= 0.0:
                         for p in range(BLOCK):
@@ -126,12 +128,34 @@ def _fill_chunks(
         )
 
 
-def build(tree, position, support, skin: float, images, team, room=None):
-    """Lists of all blocks, and the room each chunk of them needed.
+@njit(**COMPILED)
+def _regions(room):
+    """Where the region of each chunk begins and, last, where the storage ends."""
+    region = np.zeros(room.size + 1, np.int64)
+    for chunk in range(room.size):
+        # 15 % to spare: lists rebuilt in a developing flow then rarely have to be built twice
+        region[chunk + 1] = region[chunk] + room[chunk] + room[chunk] // 7 + 64
+    return region
 
-    position (D, N) and support (N,) in block order, `tree` built from them; candidates lie
-    within (1 + skin) max(H_i, H_j) of a particle i of the block. `room` (chunks,): what an earlier
-    build needed, to size the storage; where it falls short the build is done once more.
+
+@njit(**COMPILED)
+def _fits(needed, region):
+    """Whether every chunk's candidates fit into its region."""
+    fits = True
+    for chunk in range(needed.size):
+        fits = fits and needed[chunk] <= region[chunk + 1] - region[chunk]
+    return fits
+
+
+def build(
+    tree: Tree, position: np.ndarray, support: np.ndarray, skin: float, images: Images, team: Team,
+    room: np.ndarray | None = None,
+) -> tuple[Lists, np.ndarray]:  # fmt: skip
+    """Return the lists of all blocks, and the room (chunks,) that each chunk needed.
+
+    position: (D, N), support: (N,), in block order; tree: built from them. Candidates are within
+    (1 + skin) max(H_i, H_j) of a particle i of the block. room: the room that an earlier build
+    needed, to size the storage; if it is too small, the lists are built again.
     """
     dim = (0,) * position.shape[0]
     blocks = number_of_blocks(support.size)
@@ -142,14 +166,13 @@ def build(tree, position, support, skin: float, images, team, room=None):
     count = np.empty(blocks, np.int64)
     needed = np.empty(chunks, np.int64)
     while True:
-        # 15 % to spare: lists rebuilt in a developing flow then rarely have to be built twice
-        region = np.concatenate([[0], np.cumsum(room + room // 7 + 64)])
+        region = _regions(room)
         kind = np.int32 if images.sign.shape[0] <= SHORT_IMAGES else np.int64
         candidates = np.empty(region[-1], kind)
         team.run(
             _fill_chunks, chunks, dim, tree, position, support, 1.0 + skin, images, region, start,
             count, candidates, needed, smallest=SMALLEST_RANGE // CHUNK,
         )  # fmt: skip
-        if np.all(needed <= np.diff(region)):
+        if _fits(needed, region):
             return Lists(start, count, candidates), needed
         room = needed.copy()

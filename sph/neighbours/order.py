@@ -1,17 +1,17 @@
-"""Order: split at the median of the longest axis until each block holds BLOCK particles.
+"""Block order of particles: median splits along the longest axis down to BLOCK particles.
 
-Blocks are contiguous ranges of the new order and the leaves of an implicit binary tree: node k
-has the children 2k + 1 and 2k + 2 and covers blocks [first, last), split at their middle.
-The order depends on positions and IDs only, not on the order that went in, nor on threads.
+Blocks are contiguous ranges of the order and the leaves of an implicit binary tree. Node k has the
+children 2k + 1 and 2k + 2 and covers blocks [first, last), split at their middle. The order depends
+only on positions and IDs, not on the previous order or on threads.
 """
 
 import numpy as np
 from numba import njit
 
 from sph.compiled import COMPILED
-from sph.threads import SMALLEST_RANGE
+from sph.threads import SMALLEST_RANGE, Team
 
-BLOCK = 8  # particles a block: 4 or 16 were slower by 20-40 % in 3-D (density, rates and lists)
+BLOCK = 8  # particles per block; 4 and 16 were 20-40 % slower in 3-D (density, rates and lists)
 
 
 def number_of_blocks(n: int) -> int:
@@ -25,11 +25,11 @@ def _before(key_a, id_a, key_b, id_b):
 
 @njit(**COMPILED)
 def _select(key, order, identity, a, b, k):
-    """Rearrange [a, b) so that all before position k come before all from k on (quickselect)."""
+    """Partition [a, b) in place at index k of the sorted order (quickselect)."""
     lo, hi = a, b - 1
     while hi > lo:
         middle = (lo + hi) // 2
-        # median of three, so that sorted input is the best case and not the worst
+        # median of three: sorted input is then the best case instead of the worst
         for p, q in ((lo, middle), (lo, hi), (middle, hi)):
             if _before(key[q], identity[order[q]], key[p], identity[order[p]]):
                 key[p], key[q] = key[q], key[p]
@@ -57,6 +57,8 @@ def _select(key, order, identity, a, b, k):
 @njit(**COMPILED)
 def _longest_axis(position, order, a, b):
     best, axis = -1.0, 0
+    if position.shape[0] == 1:
+        return axis
     for d in range(position.shape[0]):
         lo = hi = position[d, order[a]]
         for p in range(a + 1, b):
@@ -103,7 +105,7 @@ def _split(position, identity, order, key, first, last, levels):
 
 @njit(**COMPILED)
 def _split_subtrees(first_tree, last_tree, position, identity, order, key, levels):
-    """Finish the subtrees [first_tree, last_tree) of the 2^levels that `_split` left."""
+    """Split the subtrees [first_tree, last_tree) of the 2^levels that `_split` left."""
     blocks = (order.size + BLOCK - 1) // BLOCK
     for tree in range(first_tree, last_tree):
         a, b = 0, blocks
@@ -117,12 +119,12 @@ def _split_subtrees(first_tree, last_tree, position, identity, order, key, level
             _split(position, identity, order, key, a, b, 64)
 
 
-def block_order(position, identity, team):
-    """New order of the particles, (N,) indices; position (D, N), identity (N,), a threads.Team."""
+def block_order(position: np.ndarray, identity: np.ndarray, team: Team) -> np.ndarray:
+    """Return the block order, (N,) indices. position: (D, N), identity: (N,) IDs, team: threads."""
     n = identity.size
     order = np.arange(n)
     key = np.empty(n)
-    # about four subtrees a thread even the load out; below that size there is nothing to share
+    # about four subtrees per thread balance the load; smaller numbers of blocks are not shared
     shared = team.threads > 1 and number_of_blocks(n) > 4 * team.threads * SMALLEST_RANGE
     levels = (4 * team.threads - 1).bit_length() if shared else 0
     _split(position, identity, order, key, 0, number_of_blocks(n), levels)

@@ -1,4 +1,4 @@
-"""Candidate lists kept valid: when to build them anew, with how much skin, and from what."""
+"""Management of the candidate lists: when to rebuild them, and with which skin."""
 
 from typing import NamedTuple
 
@@ -6,24 +6,26 @@ import numpy as np
 from numba import njit
 
 from sph.compiled import COMPILED
+from sph.domain import Domain, Images
 from sph.errors import NumericalError
 from sph.neighbours import first_guess, lists, order, tree
 from sph.neighbours.order import BLOCK
+from sph.threads import Team
 
-# Room for supports to grow between two builds. Where it falls short the pass is done once more.
+# Growth of support radii that lists allow between two builds. If exceeded, the pass is repeated.
 GROWTH = 0.03
 
-# Cost of building lists over the cost of the two passes, measured in 3-D with 125 neighbours:
-# (0.2 + 1.4) / (0.93 + 0.85) microseconds a particle.
+# Cost of building lists divided by that of the two passes, measured in 3-D with 125 neighbours:
+# (0.2 + 1.4) / (0.93 + 0.85) microseconds per particle.
 BUILD_OVER_PASSES = 0.9
 
-# A support asks for lists a quarter wider than itself. Where that is not enough so often in one
-# step, the guess was off by orders of magnitude (particles at one place): they get twice as much.
+# A support radius requests lists a quarter wider than itself. After this many requests in a step,
+# the guess was wrong by orders of magnitude (coincident particles), and the width is doubled.
 PATIENCE = 4
 
 
 class Origin(NamedTuple):
-    """What the lists were built from: enough, with the memory order, to build them again."""
+    """Data from which the lists were built and, with the memory order, can be rebuilt."""
 
     position: np.ndarray  # (D, N)
     support: np.ndarray  # (N,)
@@ -32,7 +34,7 @@ class Origin(NamedTuple):
 
 @njit(**COMPILED)
 def _motion(position, support, list_position, list_support):
-    """Largest |r - r_list| / H_list and largest H / H_list."""
+    """Return the largest |r - r_list| / H_list and the largest H / H_list."""
     D, n = position.shape
     moved = 0.0
     grown = 0.0
@@ -47,7 +49,7 @@ def _motion(position, support, list_position, list_support):
 
 @njit(**COMPILED)
 def _largest_step(velocity, support, dt):
-    """Largest |v| dt / H."""
+    """Return the largest |v| dt / H."""
     D, n = velocity.shape
     largest = 0.0
     for i in range(n):
@@ -59,49 +61,52 @@ def _largest_step(velocity, support, dt):
 
 
 def best_skin(step: float, dimension: int) -> float:
-    """The skin that makes a step cheapest when particles move `step` supports a step.
+    """Return the skin with the lowest cost per step if particles move `step` supports in a step.
 
-    Lists that are to serve k steps need a skin of 2 (k - 1) step beside the room for growth: each
-    step then pays 1/k of a build, and passes over candidates that grow as (1 + skin)^D.
+    Lists that serve k steps need a skin of GROWTH + 2 (k - 1) step. Each step then costs 1/k of a
+    build, and passes over candidates whose number grows as (1 + skin)^D.
     """
-    costs = [
-        (BUILD_OVER_PASSES / k + (1 + GROWTH + 2 * (k - 1) * step) ** dimension, k)
-        for k in range(1, 21)
-    ]
-    return GROWTH + 2 * (min(costs)[1] - 1) * step
+    least, steps = np.inf, 1
+    for k in range(1, 21):
+        cost = BUILD_OVER_PASSES / k + (1 + GROWTH + 2 * (k - 1) * step) ** dimension
+        if not cost < least:  # the costs are convex in k
+            break
+        least, steps = cost, k
+    return GROWTH + 2 * (steps - 1) * step
 
 
 class Search:
-    """Lists over particles in block order, and how far they can be trusted."""
+    """The candidate lists of particles in block order, and how far they are complete."""
 
-    def __init__(self, domain, team):
+    def __init__(self, domain: Domain, team: Team):
         self.domain = domain
         self.team = team
-        self.origin = None
-        self.lists = None
-        self.images = None  # that the lists refer to
-        self._room = None
-        self.reach_factor = 0.0  # of the list support: within it candidates are complete
-        self._widenings = 0  # of this step
+        self.origin: Origin | None = None
+        self.lists: lists.Lists | None = None
+        self.images: Images | None = None  # of the domain, which the lists refer to
+        self._room: np.ndarray | None = None  # that each chunk of the lists needed
+        self.reach_factor = 0.0  # candidates are complete within this factor of the list support
+        self._widenings = 0  # in this step
 
-    def stale(self, position, support) -> bool:
-        """Whether particles have moved so far that the lists may miss a neighbour.
+    def stale(self, position: np.ndarray, support: np.ndarray) -> bool:
+        """Return whether particles have moved so far that the lists may miss a neighbour.
 
-        A pair is listed if it was within (1 + skin) of the larger support; each of the two may have
-        moved since. Keeps `reach_factor` for the passes.
+        A pair is listed if its distance was within (1 + skin) of the larger support. Both particles
+        may have moved since. Also sets `reach_factor` for the passes.
         """
         self._widenings = 0
-        if self.lists is None:
+        origin = self.origin
+        if self.lists is None or origin is None:
             return True
-        moved, grown = _motion(position, support, self.origin.position, self.origin.support)
-        self.reach_factor = 1.0 + self.origin.skin - 2.0 * moved
+        moved, grown = _motion(position, support, origin.position, origin.support)
+        self.reach_factor = 1.0 + origin.skin - 2.0 * moved
         return not self.reach_factor > grown
 
-    def skin_for(self, velocity, support, dt: float) -> float:
-        """The skin for lists built now, for particles of velocity (D, N) and a step dt."""
+    def skin_for(self, velocity: np.ndarray, support: np.ndarray, dt: float) -> float:
+        """Return the skin for lists built now, for velocity (D, N), support (N,) and step dt."""
         return best_skin(_largest_step(velocity, support, dt), velocity.shape[0])
 
-    def guess(self, position, ratio: float) -> np.ndarray:
+    def guess(self, position: np.ndarray, ratio: float) -> np.ndarray:
         """Supports (N,) to begin with, none so wide that lists cannot serve it."""
         least = 1e-9 * self.domain.largest_side  # where all particles are in one place
         most = min(self.domain.longest_reach / (1 + 2 * GROWTH), self.domain.largest_side)
@@ -109,22 +114,22 @@ class Search:
         first_guess.trim(position, ratio, least, guess)
         return guess
 
-    def order(self, position, identity) -> np.ndarray:
-        """The block order of these particles, (N,) indices."""
+    def order(self, position: np.ndarray, identity: np.ndarray) -> np.ndarray:
+        """Return the block order of the particles, (N,) indices."""
         if identity.size > lists.MAX_PARTICLES:
             raise NumericalError(
-                f"{identity.size} particles are more than the {lists.MAX_PARTICLES} that lists can "
-                "number on one machine."
+                f"{identity.size} particles: expected at most {lists.MAX_PARTICLES}, the limit of "
+                "the candidate lists. Try: a smaller problem.n."
             )
         return order.block_order(position, identity, self.team)
 
-    def build(self, origin: Origin, identity) -> None:
-        """Build the lists from `origin`, whose arrays are in block order and are kept."""
+    def build(self, origin: Origin, identity: np.ndarray) -> None:
+        """Build the lists from `origin`, whose arrays are in block order and must not change."""
         largest = int(np.argmax(origin.support))
         self.domain.check_reach(origin.support[largest], identity.size, int(identity[largest]))
         self.images = self.domain.images_within((1 + origin.skin) * origin.support[largest])
         boxes = tree.build(origin.position, origin.support)
-        self.lists = None  # the old ones, the largest arrays there are, make room for the new
+        self.lists = None  # frees the old lists, the largest arrays, before the new ones are built
         self.lists, self._room = lists.build(
             boxes, origin.position, origin.support, origin.skin, self.images, self.team,
             self._room,
@@ -132,11 +137,13 @@ class Search:
         self.origin = origin
         self.reach_factor = 1.0 + origin.skin
 
-    def widen(self, position, wanted, identity) -> None:
-        """List particles where they are now, to `wanted` (blocks,) times the list support."""
+    def widen(self, position: np.ndarray, wanted: np.ndarray, identity: np.ndarray) -> None:
+        """Rebuild at current positions, with `wanted` (blocks,) times the previous list support."""
+        origin = self.origin
+        assert origin is not None  # lists have been built
         self._widenings += 1
         factor = np.repeat(np.maximum(wanted, 1.0), BLOCK)[: identity.size]
-        support = self.origin.support * factor
+        support = origin.support * factor
         if self._widenings > PATIENCE:
             support = np.where(factor > 1.0, 2.0 * support, support)
-        self.build(Origin(position.copy(), support, self.origin.skin), identity)
+        self.build(Origin(position.copy(), support, origin.skin), identity)

@@ -1,4 +1,4 @@
-"""Boxes of the block tree: what each node spans, and the largest support in it."""
+"""Bounding boxes of the block tree, with the largest support radius in each node."""
 
 from typing import NamedTuple
 
@@ -10,7 +10,7 @@ from sph.neighbours.order import BLOCK
 
 
 class Tree(NamedTuple):
-    """Nodes by heap index: the children of k are 2k + 1 and 2k + 2; unused ones have first = -1."""
+    """Nodes by heap index: node k has children 2k + 1 and 2k + 2; unused nodes have first = -1."""
 
     first: np.ndarray  # (nodes,) first block
     last: np.ndarray  # (nodes,) one past the last block
@@ -20,8 +20,8 @@ class Tree(NamedTuple):
 
 
 @njit(**COMPILED)
-def build(position, support):
-    """Boxes over particles in block order: position (D, N), support (N,)."""
+def build(position: np.ndarray, support: np.ndarray) -> Tree:
+    """Return the tree of particles in block order: position (D, N), support (N,)."""
     D, n = position.shape
     blocks = (n + BLOCK - 1) // BLOCK
     depth = 0

@@ -1,1 +1,1 @@
-"""What a run leaves on disk: checkpoints, the history of every step, the run directory."""
+"""Files that a run writes: checkpoints, the history of all steps, and the run directory."""

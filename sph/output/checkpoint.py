@@ -23,46 +23,58 @@ import numpy as np
 from sph import config as configuration
 from sph import fingerprint
 from sph.errors import ConfigError, FileError
-from sph.output import layout, stored, validity
+from sph.output import hdf5, layout, stored, validity
 from sph.output.files import Damaged, PatientFile, is_sealed, opened, replacing, seal
 from sph.output.stored import GROUP, Refused
-from sph.particles import Particles
+from sph.scene import Scene
+from sph.state import State
+from sph.totals import Baseline, Budget
 from sph.version import __version__
 
 # To be raised with every change of what the datasets of /Checkpoint mean.
-FORMAT_VERSION = 1
+FORMAT_VERSION = 2
 
 NOT_PARTICLES = ("time", "step", "next_step", "list_position", "list_support", "list_skin")
 
-# Last in the lineage of a file that holds some particles alone, which no run goes on from.
+# Last in the lineage of a file that contains only some particles, which cannot be restarted.
 PART = "a particle that failed and its neighbours, alone"
 
-START_ELSEWHERE = "Try: an earlier checkpoint of the run, or start the run anew."
+START_ELSEWHERE = "Try: an earlier checkpoint of the run, or start the run again."
 
 
 @dataclass
 class Checkpoint:
-    """The state at the end of a step, and all that a restart needs to go on bit for bit."""
+    """The state at the end of a step, and all that a restart needs to continue bit for bit."""
 
-    particles: Particles
+    particles: State
     time: float
     step: int  # steps done
-    next_step: float  # dt of the coming step, before it is cut to land on an output
+    next_step: float  # dt of the next step, before it is cut to end at an output
     list_position: np.ndarray  # (D, N) where the neighbour lists were built
     list_support: np.ndarray  # (N,) H with which they were built
     list_skin: float  # their skin, as a fraction of H
     config: configuration.Config
-    lineage: tuple[str, ...]  # the runs it came from, oldest first
+    lineage: tuple[str, ...]  # restarts of the run, oldest first
+    budget: Budget | None = None  # None: of format 1, which leaves them to the history
     computed_by: str | None = None  # of one that was read: `fingerprint.as_json` of its writer
+
+    @functools.cached_property
+    def scene(self) -> Scene:
+        """The scene of the configuration."""
+        return Scene(self.config)
 
     @property
     def pressure(self) -> np.ndarray:
-        """(N,) pressure of the corrected internal energy, as the scheme understands it."""
-        return self.particles.pressure_by(self.config.physics.eos_model())
+        """(N,) pressure of the corrected internal energy, as the formulation understands it."""
+        return self.scene.formulation.pressure(self.particles)
 
     def field(self, name: str) -> np.ndarray:
-        """(N,) or (D, N) of the particles, pressure included."""
-        return self.pressure if name == "pressure" else getattr(self.particles, name)
+        """(N,) or (D, N) of the particles, pressure included. Raises KeyError."""
+        if name == "pressure":
+            return self.pressure
+        if (found := self.particles.get(name)) is None:
+            raise KeyError(name)
+        return found
 
     def by_id(self, values: np.ndarray) -> np.ndarray:
         """`values`, (N,) or (D, N), in the order of the particles' IDs."""
@@ -70,10 +82,7 @@ class Checkpoint:
 
 
 def write(path: Path, checkpoint: Checkpoint) -> None:
-    """Write `checkpoint` to `path`: the whole file or, after an error or a kill, none of it.
-
-    Raises FileError where the file system refuses.
-    """
+    """Write `checkpoint` to `path` atomically. Raises FileError."""
     state = _state(checkpoint)
     with (
         ThreadPoolExecutor(1) as beside,
@@ -83,16 +92,16 @@ def write(path: Path, checkpoint: Checkpoint) -> None:
         digest = beside.submit(state_hash, state)  # while HDF5 waits for the disk
         with h5py.File(disk, "w") as file:
             layout.write_public(file, checkpoint)
-            _write_private(file.create_group(GROUP), checkpoint, state, digest)
+            _write_private(hdf5.create_group(file.id, GROUP), checkpoint, state, digest)
         seal(disk)
         disk.raise_failure()
 
 
 def read(path: Path) -> Checkpoint:
-    """The checkpoint in `path`, bit for bit as it was written.
+    """Return the checkpoint in `path`, bit for bit as it was written.
 
-    Raises Damaged where its content is not what was written; FileError where it is missing, cannot
-    be read, is not a checkpoint, of another format, or holds what no run writes.
+    Raises Damaged if its content is not what was written, and FileError if it is missing, cannot be
+    read, is not a checkpoint, has another format, or does not hold a valid state.
     """
     path = Path(path)
     try:
@@ -100,12 +109,11 @@ def read(path: Path) -> Checkpoint:
             state, texts = _stored(path, file)
     except FileNotFoundError:
         raise FileError(
-            f"there is no checkpoint {path}.\nTry: `ls {path.parent}` for those there are."
+            f"{path}: checkpoint not found.\nTry: `ls {path.parent}` for existing ones."
         ) from None
     _check_hashes(path, state, texts)
     config = _config(path, texts["configuration"])
-    checkpoint = _checkpoint(state, config, _lineage(path, texts["lineage"]))
-    checkpoint.computed_by = texts.get("computed_by")
+    checkpoint = _checkpoint(path, state, config, texts)
     _check_state(path, checkpoint)
     return checkpoint
 
@@ -122,17 +130,28 @@ def state_hash(state: dict[str, np.ndarray]) -> str:
 
 def _state(checkpoint: Checkpoint) -> dict[str, np.ndarray]:
     state = {name: np.asarray(getattr(checkpoint, name)) for name in NOT_PARTICLES}
+    if checkpoint.budget is not None:
+        injected, added, baseline = checkpoint.budget
+        values = np.array([injected, added, *baseline])
+        state |= {name: values[k] for k, name in enumerate(stored.ENERGIES)}
     return state | checkpoint.particles.arrays()
 
 
-def _write_private(group: h5py.Group, checkpoint: Checkpoint, state, digest) -> None:
+def _fields(particles: State) -> str:
+    """Rank of each stored field, and whether a restart can make it anew, as JSON."""
+    return json.dumps({f.name: [f.rank, f.remade] for f in particles.fields if f.stored})
+
+
+def _write_private(group: h5py.h5g.GroupID, checkpoint: Checkpoint, state, digest) -> None:
     """Write the state; digest: the future of its SHA-256."""
     for name, array in state.items():
-        group.create_dataset(name, data=array)  # no checksum of HDF5's: two digests are enough
-    text = checkpoint.config.to_toml(include_run=False)
-    group.attrs.update(
+        hdf5.write_dataset(group, name, array)  # no checksum of HDF5's: two digests are enough
+    text = checkpoint.config.recorded
+    hdf5.write_attributes(
+        group,
         {
-            "format_version": FORMAT_VERSION,
+            "format_version": FORMAT_VERSION if checkpoint.budget is not None else 1,
+            "fields": _fields(checkpoint.particles),
             "configuration": text,
             "lineage": json.dumps(checkpoint.lineage),
             "sha256": digest.result(),
@@ -140,7 +159,7 @@ def _write_private(group: h5py.Group, checkpoint: Checkpoint, state, digest) -> 
             "machine": f"{platform.machine()} {sys.byteorder}-endian",
             "versions": _versions(),
             "computed_by": fingerprint.as_json(),
-        }
+        },
     )
 
 
@@ -183,12 +202,12 @@ def _refusal(path: Path, refused: Refused, sealed: bool) -> FileError:
     if refused.kind == "format":
         version = int(refused.text)
         age, remedy = (
-            ("a newer", "a newer sph")
+            ("a newer", "a newer version of sph")
             if version > FORMAT_VERSION
-            else ("an older", "the sph that wrote it, or start the run anew")
+            else ("an older", "the version of sph that wrote it, or start the run again")
         )
         return FileError(
-            f"{path} is of {age} format ({version}) than this sph {__version__} reads "
+            f"{path} has {age} format ({version}) than this version of sph ({__version__}) reads "
             f"({FORMAT_VERSION}).\nTry: {remedy}."
         )
     if refused.kind == "damaged":
@@ -212,9 +231,7 @@ def _check_state(path: Path, checkpoint: Checkpoint) -> None:
     if not faults and PART not in checkpoint.lineage:  # a part shows numbers that are wrong
         faults = validity.faults_of_value(checkpoint)
     if faults:
-        raise FileError(
-            f"{path} does not hold the state of a run: {'; '.join(faults)}.\n{START_ELSEWHERE}"
-        )
+        raise _not_of_a_run(path, faults)
 
 
 def _lineage(path: Path, text: str) -> tuple[str, ...]:
@@ -232,20 +249,54 @@ def _config(path: Path, text: str) -> configuration.Config:
         return configuration.from_text(text, f"the configuration in {path}")
     except (ConfigError, RecursionError) as error:
         raise FileError(
-            f"{path} holds a configuration that this sph {__version__} does not take: {error}\n"
-            "Try: the sph that wrote it, or start the run anew."
+            f"{path} has a configuration that is invalid in this version of sph ({__version__}): "
+            f"{error}\nTry: the version of sph that wrote it, or start the run again."
         ) from error
 
 
-def _checkpoint(state: dict, config, lineage: tuple[str, ...]) -> Checkpoint:
-    return Checkpoint(
-        time=float(state.pop("time")),
-        step=int(state.pop("step")),
-        next_step=float(state.pop("next_step")),
-        list_position=state.pop("list_position"),
-        list_support=state.pop("list_support"),
-        list_skin=float(state.pop("list_skin")),
-        particles=Particles(**state),
+def _checkpoint(path: Path, state: dict, config, texts: dict[str, str]) -> Checkpoint:
+    budget = None
+    if stored.ENERGIES[0] in state:
+        injected, added, *baseline = (float(state.pop(name)) for name in stored.ENERGIES)
+        budget = Budget(injected, added, Baseline(*baseline))
+    others = {name: state.pop(name) for name in NOT_PARTICLES}
+    scene = Scene(config)
+    _check_fields(path, state, scene, texts.get("fields"))
+    found = Checkpoint(
+        particles=State(scene.fields, state),
+        time=float(others["time"]),
+        step=int(others["step"]),
+        next_step=float(others["next_step"]),
+        list_position=others["list_position"],
+        list_support=others["list_support"],
+        list_skin=float(others["list_skin"]),
         config=config,
-        lineage=lineage,
+        lineage=_lineage(path, texts["lineage"]),
+        budget=budget,
+        computed_by=texts.get("computed_by"),
+    )
+    found.scene = scene
+    return found
+
+
+def _check_fields(path: Path, arrays: dict, scene: Scene, fields: str | None) -> None:
+    """Raise FileError where the fields are not those of the scene, but for what can be remade."""
+    remade = set(stored.OF_SOME_SCENES[1:])  # of format 1
+    if fields is not None:
+        remade = {name for name, (_, one) in stored.fields_of(fields).items() if one}
+    needed = {field.name for field in scene.fields if field.stored}
+    faults = [
+        f"{name} is missing, which contradicts its configuration"
+        for name in sorted(needed - arrays.keys() - {f.name for f in scene.fields if f.remade})
+    ] + [
+        f"{name} is present, which contradicts its configuration"
+        for name in sorted(arrays.keys() - needed - remade)
+    ]
+    if faults:
+        raise _not_of_a_run(path, faults)
+
+
+def _not_of_a_run(path: Path, faults: list[str]) -> FileError:
+    return FileError(
+        f"{path} does not hold the state of a run: {'; '.join(faults)}.\n{START_ELSEWHERE}"
     )

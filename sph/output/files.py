@@ -1,4 +1,4 @@
-"""Open, check and replace files: whole or not there, never through a link, sealed by a digest."""
+"""Atomic writing, checked reading and checksums of files. Symbolic links are never followed."""
 
 import contextlib
 import errno
@@ -15,23 +15,23 @@ from typing import BinaryIO
 
 from sph.errors import FileError
 
-# A file that is being written is hidden beside its place; a killed run leaves it there. Its name
-# holds random digits, so that nobody can have put a link there.
+# An unfinished file is hidden in the directory of its target; a killed run leaves it behind. Its
+# name contains random digits, so that no other user can place a link there in advance.
 UNFINISHED = ".partial"
 UNFINISHED_NAME = re.compile(r"\..+\.partial")
 RANDOM_BYTES = 8
 
-# The last bytes of a sealed file: SHA-256 of all bytes before them. HDF5 does not read them.
+# The end of a sealed file: the SHA-256 of all bytes before it. HDF5 ignores it.
 SEAL = b"\nsha256 of this file up to here: "
 SEAL_LENGTH = len(SEAL) + 64 + 1
 BUFFER = 1 << 20
 
-# Directories that a run holds, by path: descriptors of what was there when it began.
+# Descriptors of the directories that a run holds open, by path.
 _held: dict[Path, int] = {}
 
 
 class Damaged(FileError):
-    """A file is not what was written: its content is lost already, so it may be replaced."""
+    """The content of a file is not what was written. The file may be replaced."""
 
 
 # --- writing ---
@@ -39,12 +39,12 @@ class Damaged(FileError):
 
 @contextlib.contextmanager
 def replacing(path: Path) -> Iterator[BinaryIO]:
-    """A file to write to, which takes the place of `path` once it is safely on disk.
+    """Yield a file to write to, which replaces `path` when the block ends without an error.
 
-    Written beside, synced, renamed, and the directory synced: at every moment, also after a
-    power cut, `path` is the old file or the new one. Left with an error, nothing has changed. A
-    link at `path` is replaced, not followed.
-    Raises FileError where the file system refuses, or the directory is no longer the one held.
+    The file is written under another name, synced and renamed, and the directory is synced. So
+    `path` is always the old file or the new one, even after a power failure. After an error, `path`
+    is unchanged. A link at `path` is replaced, not followed.
+    Raises FileError if the file cannot be written or its directory was replaced meanwhile.
     """
     path = Path(path)
     name = f".{path.name}.{secrets.token_hex(RANDOM_BYTES)}{UNFINISHED}"
@@ -65,29 +65,29 @@ def replacing(path: Path) -> Iterator[BinaryIO]:
 
 
 def write_text(path: Path, text: str) -> None:
-    """Write `text` (UTF-8) to `path`, all or nothing. Raises FileError."""
+    """Write `text` (UTF-8) to `path` atomically. Raises FileError."""
     with replacing(path) as unfinished:
-        # a path that is not UTF-8 holds lone surrogates, whose Python escape is that of JSON too
+        # a path that is not UTF-8 contains lone surrogates, which Python and JSON escape alike
         unfinished.write(text.encode("utf-8", "backslashreplace"))
 
 
 def write_new(path: Path, text: str) -> None:
-    """Write `text` to a file that must not be there yet. Raises FileError."""
+    """Write `text` to a new file. Raises FileError, also if `path` exists."""
     if os.path.lexists(path):
-        raise FileError(f"{path} is there already.\nTry: another name.")
+        raise FileError(f"{path} already exists.\nTry: another name.")
     write_text(path, text)
 
 
 def copy_file(source: Path, target: Path) -> None:
-    """A copy of `source` at `target`, all or nothing. Raises FileError."""
+    """Copy `source` to `target` atomically. Raises FileError."""
     with opened(source) as original, replacing(target) as unfinished:
         shutil.copyfileobj(original, unfinished, BUFFER)
 
 
 def open_to_append(path: Path) -> int:
-    """A descriptor that writes at the end of `path`, which is made if missing. Raises FileError.
+    """Return a descriptor that appends to `path`, which is created if missing.
 
-    A link at `path` is refused.
+    Raises FileError, also if `path` is a link.
     """
     with explained(f"cannot write {path}"):
         flags = os.O_WRONLY | os.O_APPEND | os.O_CREAT | os.O_NOFOLLOW | os.O_NONBLOCK
@@ -99,52 +99,53 @@ def open_to_append(path: Path) -> int:
 
 
 def is_unfinished(name: str) -> bool:
-    """Whether that is the name of a file that `replacing` had not finished."""
+    """Return whether `name` is that of an unfinished file of `replacing`."""
     return UNFINISHED_NAME.fullmatch(name) is not None
 
 
 def remove_unfinished(directory: Path) -> None:
-    """Remove what a killed run was writing in `directory`."""
+    """Remove the unfinished files that a killed run left in `directory`."""
     for path in directory.iterdir():
         if is_unfinished(path.name):
             path.unlink(missing_ok=True)
 
 
 class PatientFile(io.FileIO):
-    """A file for h5py to write, in which a write that fails is raised only at the end.
+    """A file for h5py whose failed writes are raised only at the end, by `raise_failure`.
 
-    HDF5 does not bear a full disk: it loses data without an error, or brings the interpreter down.
-    So it is told that all went well, and `raise_failure` tells the truth once it is done.
+    On a full disk HDF5 loses data without an error, or crashes the interpreter. So each failed
+    write is reported to HDF5 as successful.
     """
 
     def __init__(self, file: BinaryIO):
-        """Write to the empty `file`, which stays open afterwards."""
+        """Write to the empty `file`, which stays open."""
         super().__init__(file.fileno(), "w+", closefd=False)
         self._failure: BaseException | None = None
 
     def write(self, content) -> int:
         rest = memoryview(content).cast("B")
-        with self._noted():
+        try:  # no context manager, which costs as much as the write: a checkpoint is a hundred
             while rest:
                 rest = rest[super().write(rest) :]
+        except BaseException as failure:
+            self._note(failure)
         return len(content)
 
     def truncate(self, size: int | None = None) -> int:
-        with self._noted():
+        try:
             return super().truncate(size)
+        except BaseException as failure:
+            self._note(failure)
         return self.tell() if size is None else size
 
     def raise_failure(self) -> None:
-        """Raise the first failure, if there was one."""
+        """Raise the first error of a write, if there was one."""
         if self._failure is not None:
             raise self._failure
 
-    @contextlib.contextmanager
-    def _noted(self) -> Iterator[None]:
-        try:
-            yield
-        except BaseException as failure:  # an interrupt is no better for HDF5 than a full disk
-            self._failure = self._failure or failure
+    def _note(self, failure: BaseException) -> None:
+        # HDF5 tolerates an interrupt no better than a full disk
+        self._failure = self._failure or failure
 
 
 # --- reading ---
@@ -152,10 +153,10 @@ class PatientFile(io.FileIO):
 
 @contextlib.contextmanager
 def opened(path: Path) -> Iterator[io.FileIO]:
-    """The regular file at `path`, to read. No lock is asked for.
+    """Yield the regular file at `path`, open for reading, without a lock.
 
-    Raises FileError where it cannot be read; a pipe or device, which might block for ever, is
-    refused. FileNotFoundError stays as it is.
+    Raises FileNotFoundError if there is no file, and FileError if it cannot be read or is a pipe or
+    device, which might block forever.
     """
     try:
         descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK)
@@ -170,12 +171,12 @@ def opened(path: Path) -> Iterator[io.FileIO]:
         raise
     except OSError as error:
         raise FileError(
-            f"cannot read {path}: {_reason(error)}.\nTry: a regular file that you may read."
+            f"cannot read {path}: {_reason(error)}.\nTry: a regular file with read permission."
         ) from error
 
 
 def read_text(path: Path) -> str:
-    """The UTF-8 text in `path`. Raises FileError, FileNotFoundError and UnicodeDecodeError."""
+    """Return the UTF-8 text in `path`. Raises FileError, FileNotFoundError, UnicodeDecodeError."""
     with opened(path) as file:
         return file.readall().decode()
 
@@ -186,15 +187,17 @@ def read_text(path: Path) -> str:
 def seal(file: io.FileIO) -> None:
     """Append the SHA-256 of the whole file to it."""
     with contextlib.suppress(OSError, AttributeError):
-        # on Linux the disk then begins to write, while the digest is computed
+        # on Linux, writing to disk then begins while the digest is computed
         os.posix_fadvise(file.fileno(), 0, 0, os.POSIX_FADV_DONTNEED)
     digest = _digest(file, os.fstat(file.fileno()).st_size)
     file.write(SEAL + digest.encode() + b"\n")
 
 
 def is_sealed(file: io.FileIO) -> bool:
-    """Whether the file ends in the SHA-256 of what stands before it. Raises ValueError if it does
-    not match, OSError."""
+    """Return whether the file ends with the SHA-256 of all bytes before it.
+
+    Raises ValueError if that SHA-256 does not match, and OSError.
+    """
     content = os.fstat(file.fileno()).st_size - SEAL_LENGTH
     if content < 0:
         return False
@@ -208,8 +211,8 @@ def is_sealed(file: io.FileIO) -> bool:
 
 
 def _digest(file: io.FileIO, length: int) -> str:
-    """SHA-256 of the first `length` bytes; the position is then behind them."""
-    digest, buffer = hashlib.sha256(), memoryview(bytearray(BUFFER))
+    """Return the SHA-256 of the first `length` bytes; leave the position after them."""
+    digest, buffer = hashlib.sha256(), memoryview(bytearray(min(length, BUFFER)))
     file.seek(0)
     while length:
         count = file.readinto(buffer[: min(length, BUFFER)])
@@ -225,9 +228,10 @@ def _digest(file: io.FileIO, length: int) -> str:
 
 @contextlib.contextmanager
 def holding(directories: dict[Path, int]) -> Iterator[None]:
-    """Write files to these very directories meanwhile (descriptors by path), or not at all.
+    """Within the block, write files only to these directories (descriptors by path).
 
-    A directory that another has taken the place of is an error of every `replacing` in it.
+    If another directory has taken the place of one of them, each `replacing` in it raises
+    FileError.
     """
     before = dict(_held)
     _held.update(directories)
@@ -239,35 +243,35 @@ def holding(directories: dict[Path, int]) -> Iterator[None]:
 
 
 def check_in_place(path: Path, descriptor: int) -> None:
-    """Raise FileError where `path` is no longer what `descriptor` has open."""
+    """Raise FileError if `path` is no longer the file or directory open as `descriptor`."""
     try:
         if os.path.samestat(os.stat(path), os.fstat(descriptor)):
             return
     except FileNotFoundError:
         pass
     raise FileError(
-        f"{path} was moved, deleted or replaced while the run was using it: the run ends here and "
-        "writes nothing to what is there now.\nTry: one run at a time in a directory."
+        f"{path} was moved, deleted or replaced during the run. The run stops and writes nothing "
+        "more.\nTry: only one run at a time in a directory."
     )
 
 
 def is_same_path(one: Path, other: Path) -> bool:
-    """Whether both lead to the same place, there or not. A link to itself is no error."""
+    """Return whether both paths resolve to the same place, which need not exist."""
     return os.path.realpath(one) == os.path.realpath(other)
 
 
 def refuse_link(directory: Path) -> None:
-    """Raise FileError where `directory` is a link, through which a run would write elsewhere."""
+    """Raise FileError if `directory` is a symbolic link, which would redirect all files."""
     if directory.is_symlink():
         raise FileError(
-            f"{directory} is a symbolic link: files would be written to {os.readlink(directory)}.\n"
-            f"Try: `rm {directory}`, which removes the link alone."
+            f"{directory} is a symbolic link to {os.readlink(directory)}; expected a directory.\n"
+            f"Try: `rm {directory}`, which removes only the link."
         )
 
 
 @contextlib.contextmanager
 def _directory_of(path: Path) -> Iterator[int]:
-    """A descriptor of the directory of `path`: the held one, as long as it is in its place."""
+    """Yield a descriptor of the directory of `path`, the held one if there is one."""
     held = _held.get(path.parent)
     if held is not None:
         check_in_place(path.parent, held)
@@ -282,16 +286,15 @@ def _directory_of(path: Path) -> Iterator[int]:
 
 @contextlib.contextmanager
 def explained(what: str) -> Iterator[None]:
-    """Turn an OSError into a FileError that begins with `what`."""
+    """Convert an OSError within the block to a FileError whose message begins with `what`."""
     try:
         yield
     except OSError as error:
         raise FileError(
-            f"{what}: {_reason(error)}.\n"
-            "Try: a directory that you may write to and that has space left."
+            f"{what}: {_reason(error)}.\nTry: a directory with write permission and free space."
         ) from error
 
 
 def _reason(error: OSError) -> str:
-    # h5py sets the number, but its text is an account of its own internals
+    # h5py sets errno, but its text describes internals of HDF5
     return os.strerror(error.errno) if error.errno else error.strerror or str(error)

@@ -1,6 +1,7 @@
-"""The history of a run: a CSV file with one row for every step."""
+"""The history of a run: a CSV file with one row for each step."""
 
 import csv
+import functools
 import io
 import math
 import os
@@ -13,23 +14,23 @@ from sph.errors import FileError
 from sph.output.files import check_in_place, explained, open_to_append, read_text, write_text
 
 TEXT_COLUMNS = {"limiter"}
-OF_SOME_SCENES = ("held_supports", "volume_ratio", "potential_energy", "energy_added")
 
-# Columns that a restart counts on from.
+# Columns whose last values a restart continues.
 COUNTED = (
     "t", "kinetic_energy", "kinetic_energy_without_bulk", "internal_energy", "energy_drift",
     "energy_injected", "wall_seconds", "cpu_seconds", "potential_energy", "energy_added",
 )  # fmt: skip
 ALONE = (
-    "copy the checkpoint out of the run directory: `sph restart COPY -o DIR` goes on from it with "
-    "a new history."
+    "copy the checkpoint out of the run directory: `sph restart COPY -o DIR` continues it with a "
+    "new history."
 )
-# Sums over particles in another order differ by round-off; those of another state by far more.
+# Relative tolerance of sums over particles: another order of summation changes them by round-off,
+# another state by far more.
 SAME_SUM = 1e-6
 
 
 def columns(dimension: int) -> list[str]:
-    """The columns of every run: code units, `limiter_particle` an ID, momentum by axis."""
+    """Return the columns of every run, in code units. `limiter_particle` is a particle ID."""
     return [
         "step",
         "t",
@@ -53,41 +54,45 @@ def columns(dimension: int) -> list[str]:
 
 
 class History:
-    """Writes history.csv: rows are kept in memory until `flush`, which writes whole lines.
+    """Writes history.csv. Rows are kept in memory until `flush`, which writes whole lines.
 
-    Floats are written so that they read back to the same bits.
+    Floats are written with all digits, so that they read back to the same bits.
     """
 
     def __init__(self, path: Path, names: Sequence[str]):
         self.path = path
         self.columns = tuple(names)
         self._lines = io.StringIO()
-        self._writer = csv.writer(self._lines, lineterminator="\n")
+        self._texts = [k for k, name in enumerate(self.columns) if name in TEXT_COLUMNS]
         self._descriptor = open_to_append(path)
 
     @classmethod
     def create(cls, path: Path, dimension: int, extra: Sequence[str] = ()) -> "History":
-        """A new history with the columns of `columns(dimension)` and `extra`. Raises FileError."""
+        """Create a history with the columns `columns(dimension)` and `extra`. Raises FileError."""
         names = [*columns(dimension), *extra]
         write_text(Path(path), _as_text([names]))
         return cls(Path(path), names)
 
     @classmethod
     def resume(cls, path: Path, step: int) -> "History":
-        """Go on after `step`: later rows are dropped. Raises FileError."""
+        """Open a history to continue after `step`; remove later rows. Raises FileError."""
         names, rows = _names_and_rows(Path(path))
         kept = [row for row in rows if int(row[0]) <= step]
         write_text(Path(path), _as_text([names, *kept]))
         return cls(Path(path), names)
 
     def append(self, row: Mapping[str, object]) -> None:
-        """Add one step: a value for every column. Raises KeyError where one is missing."""
-        self._writer.writerow([row[name] for name in self.columns])
+        """Add the row of a step. Raises KeyError if the value of a column is missing."""
+        values = [str(row[name]) for name in self.columns]
+        for column in self._texts:
+            values[column] = _quoted(values[column])
+        # csv.writer looks at every digit for a comma, which takes half as long again
+        self._lines.write(",".join(values) + "\n")
 
     def flush(self) -> None:
-        """Write what was added and sync it, before a checkpoint that counts on it.
+        """Write and sync the rows added so far. Needed before a checkpoint of the same step.
 
-        Raises FileError, also where the file is no longer in its place.
+        Raises FileError, also if the file was moved or replaced.
         """
         unwritten = self._lines.getvalue().encode()
         if not unwritten:
@@ -96,7 +101,7 @@ class History:
         self._lines.seek(0)
         self._lines.truncate()
         with explained(f"cannot write {self.path}"):
-            # one call as a rule, so that a reader sees whole lines
+            # usually one call, so that a reader sees whole lines
             while unwritten:
                 unwritten = unwritten[os.write(self._descriptor, unwritten) :]
             os.fsync(self._descriptor)
@@ -110,10 +115,9 @@ class History:
 
 
 def read(path: Path) -> dict[str, np.ndarray]:
-    """The columns of a history, each (steps,): float64, or object where they hold text.
+    """Return the columns of a history, each (steps,): float64, or object for columns of text.
 
-    A last line that is not yet complete is left out. Raises FileError, also where a column that
-    every run has is missing.
+    An incomplete last line is ignored. Raises FileError, also if a column of `columns` is missing.
     """
     names, rows = _names_and_rows(Path(path))
     _check_columns(Path(path), names, columns(1))
@@ -125,18 +129,20 @@ def read(path: Path) -> dict[str, np.ndarray]:
 
 
 def check(
-    path: Path, dimension: int, diagnostics: Sequence[str], step: int, sums: Mapping[str, float]
-) -> None:
-    """Raise FileError where a restart cannot go on from `step` of this history.
+    path: Path, dimension: int, diagnostics: Sequence[str], optional: Sequence[str], step: int,
+    sums: Mapping[str, float],
+) -> None:  # fmt: skip
+    """Raise FileError if a restart cannot continue this history after `step`.
 
-    Its steps must follow one another from the first row to that one, whose values must be finite
-    and those of `sums`. diagnostics: the problem's own columns.
+    Steps must be consecutive from the first row to `step`, values finite, and the row of `step`
+    must agree with `sums`. diagnostics: columns of the
+    problem, which must be there; optional: columns of the scene, which older files may lack.
     """
     path = Path(path)
     names, rows = _names_and_rows(path)
     ours = columns(dimension)
     _check_columns(path, names, [*ours, *diagnostics])
-    foreign = [one for one in names if one not in (*ours, *diagnostics, *OF_SOME_SCENES)]
+    foreign = [one for one in names if one not in (*ours, *diagnostics, *optional)]
     if foreign:
         raise _of_another_run(path, f"it has columns {', '.join(foreign)}")
     kept = [row for row in rows if int(row[0]) <= step]
@@ -159,7 +165,8 @@ def check(
 
 def _of_another_run(path: Path, why: str) -> FileError:
     return FileError(
-        f"{path} is damaged or not of this run: {why}.\nTry: an earlier checkpoint; or {ALONE}"
+        f"{path} is damaged or belongs to another run: {why}.\nTry: an earlier checkpoint; or "
+        f"{ALONE}"
     )
 
 
@@ -167,31 +174,31 @@ def _check_columns(path: Path, names: Sequence[str], needed: Sequence[str]) -> N
     missing = [name for name in needed if name not in names]
     if missing:
         raise FileError(
-            f"{path} lacks the columns {', '.join(missing)}: its first line is damaged, or another "
-            f"version of sph wrote it.\nTry: the sph that wrote it; or {ALONE}"
+            f"{path} has no columns {', '.join(missing)}: its first line is damaged, or another "
+            f"version of sph wrote it.\nTry: the version of sph that wrote it; or {ALONE}"
         )
 
 
 def _names_and_rows(path: Path) -> tuple[list[str], list[list[str]]]:
-    """The header and the complete rows of `path`."""
+    """Return the header and the complete rows of `path`."""
     try:
         text = read_text(path)
     except FileNotFoundError:
-        raise FileError(f"there is no history {path}.\nTry: the directory of a run.") from None
+        raise FileError(f"{path}: history not found.\nTry: a run directory.") from None
     except UnicodeDecodeError as error:
         raise FileError(f"cannot read {path}: {error}.") from error
     complete = text[: text.rfind("\n") + 1]
     names, *rows = list(csv.reader(io.StringIO(complete))) or [[]]
     if names[:2] != ["step", "t"] or len(set(names)) < len(names):
         raise FileError(
-            f"{path} is not a history: its first line must begin with step,t and name each column "
-            "once.\nTry: the directory of a run."
+            f"{path} is not a history: expected a first line that begins with step,t and names "
+            "each column once.\nTry: a run directory."
         )
     for number, row in enumerate(rows, start=2):
         if not _is_row(names, row):
             raise FileError(
-                f"{path}, line {number}: {len(names)} values were expected, and numbers in all "
-                f"columns but {', '.join(sorted(TEXT_COLUMNS))}.\nTry: remove that line."
+                f"{path}, line {number}: expected {len(names)} values, with numbers in all columns "
+                f"except {', '.join(sorted(TEXT_COLUMNS))}.\nTry: remove that line."
             )
     return names, rows
 
@@ -207,6 +214,11 @@ def _is_row(names: Sequence[str], row: Sequence[str]) -> bool:
     except ValueError:
         return False
     return True
+
+
+@functools.lru_cache(64)  # the names of a few criteria
+def _quoted(text: str) -> str:
+    return _as_text([[text]])[:-1]
 
 
 def _as_text(rows: Sequence[Sequence[str]]) -> str:

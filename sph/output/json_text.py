@@ -1,4 +1,4 @@
-"""JSON of what the program computes: NumPy's values too, and numbers that JSON has not."""
+"""JSON text of results, including NumPy values, infinities and NaN."""
 
 import json
 import math
@@ -8,21 +8,21 @@ import numpy as np
 
 
 def json_text(content, endless: Callable[[float], str | None] = str) -> str:
-    """`content` as JSON text; NaN and infinities are what `endless` makes of them.
+    """Return `content` as JSON text. `endless` converts NaN and infinities.
 
-    As strings "nan", "inf" and "-inf" they come back by `float`. Raises TypeError for what has no
-    place in JSON.
+    The default gives the strings "nan", "inf" and "-inf", which `float` reads back. Raises
+    TypeError for values that JSON cannot express.
     """
     plain = _plain(content, endless)
     return json.dumps(plain, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
 
 
 def null(_: float) -> None:
-    """For `endless`: null, where a reader needs to know no more than that there is no number."""
+    """Pass as `endless` to write NaN and infinities as null."""
 
 
 def _plain(value, endless):
-    """`value` in JSON's own types."""
+    """Return `value` converted to types of JSON."""
     if isinstance(value, Mapping):
         return {str(name): _plain(inner, endless) for name, inner in value.items()}
     if isinstance(value, np.ndarray | np.generic):

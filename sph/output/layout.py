@@ -5,13 +5,16 @@ dimensions: its unused axes are as long as the longest used one and all particle
 middle, so that a slice through the middle of the box finds them.
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from typing import NamedTuple
 
 import h5py
 import numpy as np
 
 from sph import kernels
+from sph.formulations import PRESSURE
+from sph.output import hdf5
+from sph.state import Public
 
 # Particles a chunk, 1 to 3 MB: the Fletcher-32 filter works by the chunk.
 LONGEST_CHUNK = 131_072
@@ -24,28 +27,6 @@ CENTIMETRE_GRAM_SECOND = {
     "Unit temperature in cgs (U_T)": 1.0,
 }
 
-
-class Field(NamedTuple):
-    """A public dataset: exponents of its unit, of the cosmic scale factor, and what it is."""
-
-    length: int
-    mass: int
-    time: int
-    scale_factor: int
-    description: str
-
-
-FIELDS = {
-    "Coordinates": Field(1, 0, 0, 1, "Position from the corner of the box; add Header/Origin"),
-    "Velocities": Field(1, 0, -1, 0, "Velocity"),
-    "Masses": Field(0, 1, 0, 0, "Mass"),
-    "Densities": Field(-3, 1, 0, -3, "Density, per D-dimensional volume"),
-    "InternalEnergies": Field(2, 0, -2, -2, "Internal energy per unit mass"),
-    "SmoothingLengths": Field(1, 0, 0, 1, "Smoothing length h; the kernel ends at H = (H/h) h"),
-    "Pressures": Field(-1, 1, -2, -5, "Pressure"),
-    "ParticleIDs": Field(0, 0, 0, 0, "What stays with a particle, from 1"),
-    "ViscosityParameters": Field(0, 0, 0, 0, "Coefficient alpha of the artificial viscosity"),
-}
 
 # Names that yt knows; soft links, since pynbody does not list a field that is hard-linked twice.
 SINGULAR = {
@@ -91,47 +72,54 @@ def in_frame(frame: Frame, boundaries: tuple[str, ...], position: np.ndarray) ->
 
 def write_public(file: h5py.File, checkpoint) -> None:
     """Write all public groups of `checkpoint` (a sph.output.checkpoint.Checkpoint)."""
+    root = file.id
     particles, problem = checkpoint.particles, checkpoint.config.problem
     frame = frame_of(problem, particles.position)
-    _write_attributes(file, _header(checkpoint, frame))
-    group = file.create_group("PartType0")
-    for name, array in _fields(checkpoint, frame).items():
-        dataset = write_array(group, name, array)
-        dataset.attrs.update(_unit_attributes(FIELDS[name]))
+    for name, attributes in _header(checkpoint, frame).items():
+        hdf5.write_attributes(hdf5.create_group(root, name), attributes)
+    group = hdf5.create_group(root, "PartType0")
+    for public, array in _fields(checkpoint, frame):
+        dataset = write_array(group, public.name, array)
+        hdf5.write_attributes(dataset, _unit_attributes(public))
     for link, target in SINGULAR.items():
-        group[link] = h5py.SoftLink(f"/PartType0/{target}")
+        hdf5.link(group, link, f"/PartType0/{target}")
 
 
-def write_array(group: h5py.Group, name: str, array: np.ndarray) -> h5py.Dataset:
+def write_array(group: h5py.h5g.GroupID, name: str, array: np.ndarray) -> h5py.h5d.DatasetID:
     """A dataset in which damage is found when it is read (Fletcher-32)."""
     chunks = tuple(min(length, LONGEST_CHUNK) for length in array.shape)
-    return group.create_dataset(name, data=array, chunks=chunks, fletcher32=True)
+    return hdf5.write_dataset(group, name, array, chunks)
 
 
-def _fields(checkpoint, frame: Frame) -> dict[str, np.ndarray]:
+def _fields(checkpoint, frame: Frame) -> Iterator[tuple[Public, np.ndarray]]:
+    """Each public field: scalars (N,), vectors (N, 3), tensors (N, 3, 3)."""
     config, particles = checkpoint.config, checkpoint.particles
-    kernel = config.physics.kernel_model()
-    velocity = np.zeros((particles.number, 3))
-    velocity[:, : particles.dimension] = particles.velocity.T
-    fields = {
-        "Coordinates": in_frame(frame, config.problem.boundaries, particles.position),
-        "Velocities": velocity,
-        "Masses": particles.mass,
-        "Densities": particles.density,
-        "InternalEnergies": particles.internal_energy,
-        "SmoothingLengths": particles.support / kernels.support_ratio(kernel, particles.dimension),
-        "Pressures": checkpoint.pressure,
-        "ParticleIDs": particles.id,
-    }
-    if particles.alpha is not None:
-        fields["ViscosityParameters"] = particles.alpha
-    return fields
+    for field in particles.fields:
+        if field.public is None or not field.stored:
+            continue
+        array = getattr(particles, field.name)
+        if field.name == "position":
+            array = in_frame(frame, config.problem.boundaries, array)
+        elif field.name == "support":
+            kernel = config.physics.kernel_model()
+            array = array / kernels.support_ratio(kernel, particles.dimension)
+        elif field.rank:
+            array = _in_three_dimensions(array)
+        yield field.public, array
+    yield PRESSURE, checkpoint.pressure
+
+
+def _in_three_dimensions(array: np.ndarray) -> np.ndarray:
+    """(N, 3) of a vector (D, N), or (N, 3, 3) of a tensor (D, D, N): zero along unused axes."""
+    *ranks, n = array.shape
+    found = np.zeros((n, *(3 for _ in ranks)))
+    found[(slice(None), *(slice(length) for length in ranks))] = np.moveaxis(array, -1, 0)
+    return found
 
 
 def _header(checkpoint, frame: Frame) -> dict[str, Mapping]:
     """Attributes of each group that holds nothing else."""
     physics, dimension = checkpoint.config.physics, checkpoint.particles.dimension
-    kernel = physics.kernel if isinstance(physics.kernel, str) else physics.kernel["name"]
     # Six kinds of particle, gas first: yt reads six and no more.
     number = np.array([checkpoint.particles.number, 0, 0, 0, 0, 0])
     return {
@@ -164,8 +152,8 @@ def _header(checkpoint, frame: Frame) -> dict[str, Mapping]:
         "HydroScheme": {
             **_equation_of_state(physics.eos_model()),
             "Dimension": np.array([dimension]),
-            "Scheme": np.bytes_(physics.scheme),
-            "Kernel function": np.bytes_(kernel),
+            "Scheme": np.bytes_(checkpoint.scene.formulation.label),
+            "Kernel function": np.bytes_(physics.kernel_model().name),
             "Kernel eta": np.array([physics.eta]),
             "CFL parameter": np.array([physics.C]),
         },
@@ -174,23 +162,17 @@ def _header(checkpoint, frame: Frame) -> dict[str, Mapping]:
 
 def _equation_of_state(eos) -> dict:
     """Its name and its parameters, gamma under the name that readers know."""
-    name = type(eos).__module__.rsplit(".", 1)[-1]
     parameters = {key: np.array([value]) for key, value in eos._asdict().items()}
     if "gamma" in parameters:
         parameters["Adiabatic index"] = parameters.pop("gamma")
-    return {"Equation of state": np.bytes_(name), **parameters}
-
-
-def _write_attributes(file: h5py.File, groups: Mapping[str, Mapping]) -> None:
-    for name, attributes in groups.items():
-        file.create_group(name).attrs.update(attributes)
+    return {"Equation of state": np.bytes_(eos.name), **parameters}
 
 
 def _one_element(numbers: Mapping[str, float]) -> dict[str, np.ndarray]:
     return {name: np.array([number]) for name, number in numbers.items()}
 
 
-def _unit_attributes(field: Field) -> dict:
+def _unit_attributes(field: Public) -> dict:
     return _one_element(
         {
             "U_L exponent": float(field.length),

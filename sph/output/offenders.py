@@ -1,4 +1,4 @@
-"""What a run that failed leaves of the place where it did: a particle and its neighbours."""
+"""The file offenders.h5 of a failed run: the particle at which it failed, and its neighbours."""
 
 from pathlib import Path
 
@@ -8,17 +8,17 @@ from sph.domain import Domain
 from sph.errors import FileError
 from sph.output import checkpoint as checkpoints
 from sph.output.checkpoint import PART, Checkpoint
-from sph.particles import Particles
+from sph.state import State
 
-# Lines of the table: with the words around it, one screen.
+# Most lines of the table, so that the message fits one screen.
 SHOWN = 8
 
 
 def leave(path: Path, state: Checkpoint, identity: int) -> str:
-    """Write the particle of that ID and its neighbours to `path`; returns them in words.
+    """Write the particle with ID `identity` and its neighbours to `path`; return a table of them.
 
-    The file is a checkpoint like any other, of those particles alone, in order of distance. Nothing
-    is written, and the words are empty, where no particle has that ID.
+    The file is a checkpoint of these particles only, in order of distance. If no particle has that
+    ID, nothing is written and the text is empty.
     """
     found = np.flatnonzero(state.particles.id == identity)
     if not found.size:
@@ -26,14 +26,17 @@ def leave(path: Path, state: Checkpoint, identity: int) -> str:
     indices, distance = _neighbourhood(state, int(found[0]))
     try:
         checkpoints.write(path, _part(state, indices))
-        where = f"They are in {path}, in the layout of a checkpoint.\n"
-    except FileError as error:  # a full disk must not hide what went wrong
-        where = f"They could not be written: {error}\n"
+        where = f"These particles are in {path}, which has the format of a checkpoint.\n"
+    except FileError as error:  # the error of the run must be shown also if the disk is full
+        where = f"These particles could not be written: {error}\n"
     return _table(state.particles, indices, distance) + where
 
 
 def _neighbourhood(state: Checkpoint, i: int) -> tuple[np.ndarray, np.ndarray]:
-    """Indices of i and all within a support of it or it of them, nearest first; distances."""
+    """Return indices of i and its neighbours, nearest first, and their distances.
+
+    Neighbours are particles closer to i than the larger of both support radii.
+    """
     particles, problem = state.particles, state.config.problem
     here = particles.position[:, i, None]
     squared = np.full(particles.number, np.inf)
@@ -50,12 +53,8 @@ def _neighbourhood(state: Checkpoint, i: int) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _part(state: Checkpoint, indices: np.ndarray) -> Checkpoint:
-    arrays = {
-        name: np.ascontiguousarray(array[..., indices])
-        for name, array in state.particles.arrays().items()
-    }
     return Checkpoint(
-        particles=Particles(**arrays),
+        particles=state.particles.subset(indices),
         time=state.time,
         step=state.step,
         next_step=state.next_step,
@@ -64,10 +63,11 @@ def _part(state: Checkpoint, indices: np.ndarray) -> Checkpoint:
         list_skin=state.list_skin,
         config=state.config,
         lineage=(*state.lineage, PART),
+        budget=state.budget,
     )
 
 
-def _table(particles: Particles, indices: np.ndarray, distance: np.ndarray) -> str:
+def _table(particles: State, indices: np.ndarray, distance: np.ndarray) -> str:
     names = ("ID", "distance", "support", "density", "energy", "du/dt", "speed", "|dv/dt|")
     lines = ["".join(f"{name:>11}" for name in names)]
     for i, r in zip(indices[:SHOWN], distance, strict=False):
@@ -78,7 +78,7 @@ def _table(particles: Particles, indices: np.ndarray, distance: np.ndarray) -> s
         )  # fmt: skip
         lines.append(f"{particles.id[i]:>11}" + "".join(f"{value:>11.3g}" for value in values))
     if not particles.support[indices[0]] > 0.0:
-        return "\n".join([*lines, "Its neighbours are not known yet."]) + "\n"
+        return "\n".join([*lines, "The neighbours of this particle are not known yet."]) + "\n"
     more = indices.size - SHOWN
-    lines.append(f"and {more} more neighbours." if more > 0 else "These are all its neighbours.")
+    lines.append(f"... and {more} more neighbours." if more > 0 else "(no further neighbours)")
     return "\n".join(lines) + "\n"

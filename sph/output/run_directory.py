@@ -1,4 +1,4 @@
-"""The directory of a run: where everything is, and what may be replaced."""
+"""The run directory: the paths of its files, and which of them may be replaced."""
 
 import fcntl
 import json
@@ -29,33 +29,33 @@ from sph.output.files import (
 )
 from sph.output.json_text import json_text
 from sph.shell_words import quoted
+from sph.summary import Summary, of_json
 
 CHECKPOINT_NAME = re.compile(r"checkpoint_(\d{6,})\.h5")
 
-# A checkpoint of a run that failed is good while energy has drifted by less than this part of
-# physics.max_energy_drift: before a collapse the drift grows by more than that from step to step.
+# A checkpoint of a failed run is valid if its energy drift is below this fraction of
+# physics.max_energy_drift: shortly before a failure the drift grows by more than that per step.
 GOOD = 0.1
 
-# Bytes of a history that is read to see whether it ends after its first step: a row has some 500.
+# Bytes of a history that are read to see whether it has a second step; a row has about 500.
 LONGEST_BEGINNING = 100_000
 
-# First line of config.toml: what tells a run directory from a user's folder of the same look,
-# before --force may remove anything from it.
+# First line of config.toml. It marks a run directory, from which --force may remove files.
 MARK = "# The resolved configuration of a run of sph.\n"
 
 
 @dataclass(frozen=True)
 class RunDirectory:
-    """Paths in a run directory, none of which need exist but `path` and its checkpoints/."""
+    """Paths in a run directory. Only `path` and `path`/checkpoints must exist."""
 
     path: Path
 
     @classmethod
     def create(cls, path: Path, force: bool = False) -> "RunDirectory":
-        """An empty run directory at `path`, its parents made where they are missing.
+        """Create an empty run directory at `path`, and its parents.
 
-        With `force` an earlier run there is removed, but nothing that is not of that run.
-        Raises FileError where there is something else, or an earlier run and no force.
+        With `force`, the files of an earlier run in it are removed, and no others. Raises FileError
+        if `path` holds other files, or an earlier run and `force` is false.
         """
         run = cls(Path(path))
         with explained(f"cannot write to {path}"):
@@ -64,7 +64,7 @@ class RunDirectory:
             there = run.path.is_dir() and not _holds_nothing(run.path)
             if there and not _is_run(run):
                 raise FileError(
-                    f"{path} is not a run directory, and it holds other things.\n"
+                    f"{path} is not a run directory, and it is not empty.\n"
                     "Try: a new directory, with -o."
                 )
             refuse_link(run._checkpoint_directory)
@@ -77,11 +77,11 @@ class RunDirectory:
 
     @classmethod
     def open(cls, path: Path) -> "RunDirectory":
-        """The run directory at `path`. Raises FileError where there is none."""
+        """Return the run directory at `path`. Raises FileError if there is none."""
         run = cls(Path(path))
         if not run._checkpoint_directory.is_dir():
-            there = "is not a run directory" if run.path.exists() else "does not exist"
-            raise FileError(f"{path} {there}.\nTry: the directory that `sph run` named, with -o.")
+            problem = "is not a run directory" if run.path.exists() else "does not exist"
+            raise FileError(f"{path} {problem}.\nTry: a directory that `sph run` wrote.")
         refuse_link(run._checkpoint_directory)
         return run
 
@@ -99,7 +99,7 @@ class RunDirectory:
 
     @property
     def offenders(self) -> Path:
-        """Where a run that failed leaves the particles at which it did."""
+        """Path of the file in which a failed run stores the particles at which it failed."""
         return self.path / "offenders.h5"
 
     @property
@@ -107,35 +107,34 @@ class RunDirectory:
         return self.path / "figures"
 
     @property
-    def diagnostics(self) -> Path:
-        return self.path / "diagnostics"
-
-    @property
     def _checkpoint_directory(self) -> Path:
         return self.path / "checkpoints"
 
     def checkpoint_path(self, number: int) -> Path:
-        """Where checkpoint `number`, from 0, is or will be."""
+        """Return the path of checkpoint `number`, which counts from 0."""
         return self._checkpoint_directory / f"checkpoint_{number:06d}.h5"
 
     def checkpoints(self) -> list[Path]:
-        """The checkpoints that are there, by number."""
-        found = self._checkpoint_directory.iterdir()
-        named = [path for path in found if checkpoint_number(path) is not None]
-        return sorted(named, key=checkpoint_number)
+        """Return the existing checkpoints, in order of their numbers."""
+        return list(self._numbered().values())
+
+    def _numbered(self) -> dict[int, Path]:
+        """Return the existing checkpoints by number, in order."""
+        found = [(checkpoint_number(path), path) for path in self._checkpoint_directory.iterdir()]
+        return dict(sorted((number, path) for number, path in found if number is not None))
 
     @property
     def has_failed(self) -> bool:
-        """Whether the summary says so."""
+        """Whether the run failed, according to its summary."""
         return self.read_summary().get("status") == "failed"
 
     def latest(self) -> Path:
-        """The last checkpoint that is not damaged.
+        """Return the last checkpoint that is not damaged.
 
-        Raises Damaged where there is none, FileError where a later one cannot be judged: it may be
-        good.
+        Raises Damaged if there is none, and FileError if a later one cannot be read, since that one
+        may be valid.
         """
-        reason = "it has no checkpoints.\nTry: `sph run`, from the start"
+        reason = "it has no checkpoints.\nTry: `sph run`, to start the run again"
         for path in reversed(self.checkpoints()):
             try:
                 checkpoint.read(path)
@@ -146,10 +145,10 @@ class RunDirectory:
         raise Damaged(f"{self.path} cannot be restarted: {reason}")
 
     def last_good(self) -> Path:
-        """Of a run that failed, the last checkpoint from which energy had hardly drifted.
+        """Return the last checkpoint of a failed run that was written before its energy drifted.
 
-        A step that goes wrong is found some steps later: a checkpoint written in between holds the
-        wrong state already. Raises FileError where none can be read.
+        A faulty step is detected only some steps later, and a checkpoint written in between holds a
+        faulty state. Raises FileError if no checkpoint can be read.
         """
         if not self.history.exists():
             return self.latest()
@@ -163,50 +162,63 @@ class RunDirectory:
         return self.latest()
 
     def check_belongs(self, path: Path, state: Checkpoint, into: Path | None = None) -> None:
-        """Raise FileError where the directory holds what is not of the run of checkpoint `path`.
+        """Raise FileError if the directory holds files of another run than checkpoint `path`.
 
-        `state` is what that holds. Looked at are the configuration, the history, the checkpoint
-        before and, unless the run goes on `into` another directory, all later ones, which it
-        replaces. A damaged one is no obstacle.
+        `state` is the content of `path`. Checked are the configuration, the history, the previous
+        checkpoint and, unless the run continues `into` another directory, all later checkpoints,
+        which it replaces. Damaged checkpoints are ignored.
         """
         same_run.check_configuration(self.config, state)
-        number = checkpoint_number(path)
-        if number or self.history.exists():  # the first may be a copy that no run went on from yet
+        number = checkpoint_number(path) or 0
+        if number or self.history.exists():  # the first may be a copy that was not continued yet
             same_run.check_history(self.history, state)
-        numbers = {checkpoint_number(one): one for one in self.checkpoints()}
-        for other in sorted((one for one in numbers if one < number), reverse=True):
+        numbers = self._numbered()
+        for other in reversed([one for one in numbers if one < number]):
             with suppress(Damaged):
                 before = checkpoint.read(numbers[other])
                 same_run.check_order(numbers[other], path, before, state)
                 break
         stays = into is None or is_same_path(into, self.path)
-        for other in sorted(one for one in numbers if one > number and stays):
+        for other in [one for one in numbers if one > number and stays]:
             with suppress(Damaged):
                 after = checkpoint.read(numbers[other])
                 same_run.check_order(path, numbers[other], state, after)
                 path, state = numbers[other], after
 
     def drop_checkpoints_after(self, number: int) -> None:
-        """Remove later checkpoints, and what a killed run left unfinished. Raises FileError."""
+        """Remove later checkpoints and the unfinished files of a killed run. Raises FileError."""
         with explained(f"cannot remove checkpoints of {self.path}"):
-            for path in self.checkpoints():
-                if checkpoint_number(path) > number:
+            for other, path in self._numbered().items():
+                if other > number:
                     path.unlink()
             self._remove_unfinished()
 
     def write_config(self, text: str) -> None:
-        """Write config.toml, all or nothing. Raises FileError."""
+        """Write config.toml atomically. Raises FileError."""
         write_text(self.config, MARK + text)
 
     def write_summary(self, summary: Mapping) -> None:
-        """Write summary.json, all or nothing; "nan", "inf" and "-inf" are strings there.
+        """Write summary.json atomically, with non-finite numbers as "nan", "inf" and "-inf".
 
-        Raises FileError, and TypeError for what has no place in JSON.
+        Raises FileError, and TypeError for values that JSON cannot express.
         """
         write_text(self.summary, json_text(summary))
 
+    def whole_summary(self) -> Summary:
+        """The summary of a run that has ended. Raises FileError where it cannot be read."""
+        try:
+            return of_json(read_text(self.summary))
+        except (OSError, ValueError, RecursionError) as error:
+            raise FileError(
+                f"{self.summary} cannot be read: {error}.\n"
+                "Try: the sph that wrote it; or `sph restart` of its directory, if it is damaged."
+            ) from None
+
     def read_summary(self) -> dict:
-        """What summary.json holds, or an empty dictionary where it cannot be read."""
+        """Return the content of summary.json, or an empty dictionary if it cannot be read.
+
+        For the status of a run that may not have ended; `whole_summary` has the figures.
+        """
         try:
             found = json.loads(read_text(self.summary))
         except (OSError, FileError, ValueError, RecursionError):
@@ -215,10 +227,10 @@ class RunDirectory:
 
     @contextmanager
     def alone(self) -> Iterator[None]:
-        """Hold the directory against other processes meanwhile. Raises FileError where one has it.
+        """Lock the directory within the block. Raises FileError if another process has locked it.
 
-        Files are written to this very directory, also if another takes its place.
-        Where the file system knows no locks, nothing is held.
+        Files are written to the locked directory even if another one takes its place. On file
+        systems without locks, nothing is locked.
         """
         with explained(f"cannot open {self.path}"):
             flags = os.O_RDONLY | os.O_DIRECTORY
@@ -229,8 +241,8 @@ class RunDirectory:
                 fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
             except BlockingIOError:
                 raise FileError(
-                    f"{self.path} is in use: another sph is running there.\n"
-                    "Try: wait for its end, or another directory with -o."
+                    f"{self.path} is in use by another run of sph.\n"
+                    "Try: wait until that run has ended, or another directory, with -o."
                 ) from None
             except OSError:
                 pass  # this file system has no locks
@@ -244,18 +256,17 @@ class RunDirectory:
         begun = self.checkpoints() or (self.history.exists() and not self._ended_at_once())
         if begun and not force:
             raise FileError(
-                f"{self.path} holds a run already.\nTry: --force to replace it, "
-                f"`sph restart {quoted(self.path)}` to go on with it, or another directory with -o."
+                f"{self.path} already holds a run.\nTry: --force to replace it, "
+                f"`sph restart {quoted(self.path)}` to continue it, or another directory, with -o."
             )
-        for tree in (self.figures, self.diagnostics):
-            if tree.is_dir() and not tree.is_symlink():
-                shutil.rmtree(tree)
+        if self.figures.is_dir() and not self.figures.is_symlink():
+            shutil.rmtree(self.figures)
         for path in (self.history, self.summary, self.offenders, *self.checkpoints()):
             path.unlink(missing_ok=True)
-        self.write_config("")  # its mark stays: beside a user's files this is still a run directory
+        self.write_config("")  # keeps MARK, so that this remains a run directory
 
     def _ended_at_once(self) -> bool:
-        """Whether its run ended before its first checkpoint, so that nothing is lost with it."""
+        """Return whether the run ended in its first step, so that nothing of value is lost."""
         if self.summary.exists():
             return False
         with opened(self.history) as file:
@@ -267,17 +278,16 @@ class RunDirectory:
 
 
 def checkpoint_number(path: Path) -> int | None:
-    """The number in a checkpoint's name, or None where it is no such name."""
+    """Return the number in a checkpoint's file name, or None for other names."""
     name = CHECKPOINT_NAME.fullmatch(path.name)
     return int(name[1]) if name else None
 
 
 def find(run_or_checkpoint: Path) -> tuple[RunDirectory | None, Path]:
-    """What to restart from: a run directory's last good checkpoint, or that very checkpoint.
+    """Return the run directory and the checkpoint to restart from. Raises FileError.
 
-    Of a run that failed that is `RunDirectory.last_good`, else the last that can be read.
-
-    The run directory is None for a checkpoint that is in none. Raises FileError.
+    For a run directory, the checkpoint is `last_good` of a failed run, otherwise `latest`. For a
+    checkpoint, it is that checkpoint; the run directory is None if the checkpoint is not in one.
     """
     path = Path(run_or_checkpoint)
     if path.is_dir():
@@ -300,5 +310,5 @@ def _is_run(run: RunDirectory) -> bool:
 
 
 def _holds_nothing(directory: Path) -> bool:
-    """No file but unfinished ones: empty, or what a run left that died before it began."""
+    """Return whether the directory has no files, or only unfinished ones of a killed run."""
     return all(is_unfinished(name) for _, _, files in os.walk(directory) for name in files)

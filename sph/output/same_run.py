@@ -1,4 +1,4 @@
-"""Whether the files in a run directory are of one run: nothing of another run may be replaced."""
+"""Checks that the files in a run directory belong to one run, so that no other run is replaced."""
 
 import itertools
 from pathlib import Path
@@ -11,20 +11,20 @@ from sph.output import history
 from sph.output.checkpoint import Checkpoint
 from sph.output.files import read_text
 
-REMEDY = f"Try: move what is not of this run out of the directory; or {history.ALONE}"
+REMEDY = f"Try: move the files of the other run out of the directory; or {history.ALONE}"
 
 
 def check_configuration(path: Path, checkpoint: Checkpoint) -> None:
-    """Raise FileError where config.toml, if it can be read, is of another problem."""
+    """Raise FileError if config.toml can be read and has another problem."""
     try:
         there = configuration.from_text(read_text(path), str(path))
     except (ConfigError, FileError, OSError, UnicodeDecodeError):
-        return  # missing or of another version: the checkpoint tells what it needs
+        return  # missing or of another version: the checkpoint holds the configuration as well
     check_problem(path, there.problem, checkpoint.config.problem)
 
 
 def check_problem(path: Path, problem, of_the_run) -> None:
-    """Raise FileError where the problem in `path` is another than that of the run."""
+    """Raise FileError if the problem in `path` differs from that of the run."""
     if problem != of_the_run:
         keys = problem.model_dump() | of_the_run.model_dump()
         other = [
@@ -34,7 +34,7 @@ def check_problem(path: Path, problem, of_the_run) -> None:
 
 
 def check_history(path: Path, checkpoint: Checkpoint) -> None:
-    """Raise FileError where the history does not lead to that state."""
+    """Raise FileError if the history does not lead to the state in the checkpoint."""
     p, config = checkpoint.particles, checkpoint.config
     with np.errstate(all="ignore"):
         sums = {
@@ -43,18 +43,19 @@ def check_history(path: Path, checkpoint: Checkpoint) -> None:
             "internal_energy": float(p.mass @ p.internal_energy),
         }
         diagnostics = list(config.problem.diagnostics(p))
-    history.check(path, p.dimension, diagnostics, checkpoint.step, sums)
+    optional = checkpoint.scene.columns
+    history.check(path, p.dimension, diagnostics, optional, checkpoint.step, sums)
 
 
 def check_order(earlier: Path, later: Path, before: Checkpoint, after: Checkpoint) -> None:
-    """Raise FileError where two checkpoints, next to each other by number, are not of one run."""
+    """Raise FileError if two checkpoints with consecutive numbers are not of one run."""
     check_problem(later, after.config.problem, before.config.problem)
     if not np.array_equal(np.sort(before.particles.id), np.sort(after.particles.id)):
-        raise _other(later, f"its particles are not those of {earlier.name}")
+        raise _other(later, f"its particle IDs differ from those of {earlier.name}")
     if after.step <= before.step or after.time <= before.time:
         raise _other(
             later,
-            f"step {after.step}, t = {after.time!r} do not come after step {before.step}, "
+            f"step {after.step}, t = {after.time!r} is not after step {before.step}, "
             f"t = {before.time!r} of {earlier.name}",
         )
     if after.lineage[: len(before.lineage)] != before.lineage:
@@ -63,16 +64,16 @@ def check_order(earlier: Path, later: Path, before: Checkpoint, after: Checkpoin
         False
     ):
         raise _other(
-            later, f"its configuration is not that of {earlier.name}: {_key(before, after)}"
+            later, f"its configuration differs from that of {earlier.name}: {_key(before, after)}"
         )
 
 
 def _key(before: Checkpoint, after: Checkpoint) -> str:
-    """The first key that differs, with both values."""
+    """Return the first key that differs, with both values."""
     tables = [one.config.to_toml(False).splitlines() for one in (before, after)]
     pairs = itertools.zip_longest(*tables, fillvalue="nothing")
     return next(f"{there} and {here}" for there, here in pairs if there != here)
 
 
 def _other(path: Path, why: str) -> FileError:
-    return FileError(f"{path} is not of this run: {why}.\n{REMEDY}")
+    return FileError(f"{path} belongs to another run: {why}.\n{REMEDY}")

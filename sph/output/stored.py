@@ -1,14 +1,15 @@
-"""What the group /Checkpoint of an HDF5 file holds, read so that no file can do harm.
+"""Safe reading of the group /Checkpoint of an HDF5 file, which may be damaged or hostile.
 
-Only what `sph.output.checkpoint` writes is read: each link, dataset and attribute is judged before
-HDF5 follows or fills it. HDF5 itself crashes, hangs or takes all memory on some damaged files. A
-file without a digest is therefore read by a child process first, under limits: this file alone,
-run as a script, so it imports nothing of sph.
+Only what `sph.output.checkpoint` writes is read. Each link, dataset and attribute is checked before
+HDF5 follows or reads it. HDF5 itself crashes, hangs or exhausts memory on some damaged files. So a
+file without a digest is first read by a child process with limited time and memory. The child runs
+this file as a script, which therefore imports nothing of sph.
 """
 
 import io
 import json
 import os
+import re
 import resource
 import subprocess
 import sys
@@ -19,33 +20,35 @@ import numpy as np
 GROUP = "Checkpoint"
 SIGNATURE = b"\x89HDF\r\n\x1a\n"
 
-# Number of axes of each dataset; all are float64 but those of INTEGERS.
+# Number of axes of each dataset. All are float64 except INTEGERS.
 SCALARS = ("time", "step", "next_step", "list_skin")
-VECTORS = ("position", "velocity", "acceleration", "list_position")
-LISTS = ("id", "mass", "internal_energy", "support", "density", "omega", "energy_rate",
-         "list_support")  # fmt: skip
-OF_SOME_SCENES = ("alpha", "alpha_rate", "pressure")
-AXES = {
-    **dict.fromkeys(SCALARS, 0),
-    **dict.fromkeys((*LISTS, *OF_SOME_SCENES), 1),
-    **dict.fromkeys(VECTORS, 2),
+ENERGIES = ("energy_injected", "energy_added", "baseline_energy", "baseline_scale")  # format 2
+LISTS = {"list_position": 2, "list_support": 1}
+# Fields of every checkpoint, and those that one of format 1 may have; format 2 names its fields.
+FIELDS = {
+    **dict.fromkeys(
+        ("id", "mass", "internal_energy", "support", "density", "omega", "energy_rate"), 1
+    ),
+    **dict.fromkeys(("position", "velocity", "acceleration"), 2),
 }
+OF_SOME_SCENES = ("alpha", "alpha_rate", "pressure")
+NAME = re.compile(r"[a-z][a-z0-9_]{0,60}")
 INTEGERS = ("id", "step")
 TEXTS = ("configuration", "lineage", "sha256", "configuration_sha256")
-LATER_TEXTS = ("computed_by",)  # which the first files did not have
+LATER_TEXTS = ("computed_by", "fields")  # missing in the oldest files
 
-# What h5py raises on a damaged file, by where in it the damage is.
+# Exceptions of h5py on damaged files.
 DAMAGE = (OSError, RuntimeError, KeyError, ValueError, TypeError, AttributeError)
 
-# Limits of the child process: seconds and bytes, for the smallest file and for each of its bytes.
+# Limits of the child process in CPU seconds and bytes: a constant, and a part per byte of the file.
 SECONDS, SECONDS_A_BYTE = 5.0, 1 / 20e6
 MEMORY, MEMORY_A_BYTE = 256 << 20, 3
-# How much longer than its processor seconds it may take, on a machine that others use too.
+# Ratio of the wall-clock limit to the CPU limit, for a busy machine.
 PATIENCE = 6
 
 
 class Refused(Exception):
-    """Why a file is not read; kind: "damaged", "foreign" or "format" (the text is its number)."""
+    """A file is refused. kind: "damaged", "foreign" or "format" (its text is the format number)."""
 
     def __init__(self, kind: str, text: str):
         super().__init__(text)
@@ -53,17 +56,19 @@ class Refused(Exception):
 
 
 def load(file: io.FileIO, version: int) -> tuple[dict[str, np.ndarray], dict[str, str]]:
-    """The datasets and the texts of /Checkpoint. Raises Refused; version: the format known here.
+    """Return the datasets and the text attributes of /Checkpoint. Raises Refused.
 
-    HDF5 reads through `file`: it takes no lock, and opens no other file.
+    version: the newest format number that this version of sph reads. HDF5 reads through `file`, so
+    it takes no lock and opens no other file.
     """
     try:
         with h5py.File(file, "r") as opened:
-            group = _group(opened, version)
+            group, found = _group(opened, version)
             size = os.fstat(file.fileno()).st_size
-            datasets = _datasets(group)
+            axes, optional = _axes(group, found)
+            datasets = _datasets(group, axes, optional)
             for name, dataset in datasets.items():
-                _check(name, dataset, size)
+                _check(name, axes[name], dataset, size)
             if sum(one.nbytes for one in datasets.values()) > size:
                 raise Refused("foreign", "its datasets are larger than the file")
             later = [one for one in LATER_TEXTS if h5py.h5a.exists(group.id, one.encode())]
@@ -74,7 +79,7 @@ def load(file: io.FileIO, version: int) -> tuple[dict[str, np.ndarray], dict[str
 
 
 def check_apart(file: io.FileIO, version: int) -> None:
-    """Read the file in a process of its own, under limits. Raises Refused."""
+    """Read the file in a child process with limited time and memory. Raises Refused."""
     size = os.fstat(file.fileno()).st_size
     seconds = SECONDS + SECONDS_A_BYTE * size
     command = [sys.executable, "-P", __file__, str(version), str(seconds)]
@@ -87,16 +92,19 @@ def check_apart(file: io.FileIO, version: int) -> None:
             check=False,
         )
     except subprocess.TimeoutExpired:
-        raise Refused("damaged", "HDF5 does not come to an end with it") from None
+        raise Refused("damaged", "HDF5 did not finish reading it in time") from None
     if child.returncode == 0:
         return
     try:
         raise Refused(*json.loads(child.stdout))
     except (ValueError, TypeError):
-        raise Refused("damaged", "HDF5 fails at it, or wants too much time or memory") from None
+        raise Refused(
+            "damaged", "HDF5 fails to read it, or needs too much time or memory"
+        ) from None
 
 
-def _group(file: h5py.File, version: int) -> h5py.Group:
+def _group(file: h5py.File, version: int) -> tuple[h5py.Group, int]:
+    """Return /Checkpoint and the number of its format."""
     name = GROUP.encode()
     if name not in file.id or not _is_hard(file.id, name):
         raise Refused("foreign", f"it has no group /{GROUP}")
@@ -104,21 +112,51 @@ def _group(file: h5py.File, version: int) -> h5py.Group:
     if not h5py.h5a.exists(group.id, b"format_version"):
         raise Refused("foreign", f"/{GROUP} has no format_version")
     found = int(_attribute(group, "format_version", int))
-    if found != version:
+    if not 1 <= found <= version:
         raise Refused("format", str(found))
-    return group
+    return group, found
 
 
-def _datasets(group: h5py.Group) -> dict[str, h5py.Dataset]:
-    """The datasets of /Checkpoint, not read yet."""
-    there = {name for name in AXES if name.encode() in group.id}
-    missing = AXES.keys() - there - set(OF_SOME_SCENES)
+def _axes(group: h5py.Group, version: int) -> tuple[dict[str, int], set[str]]:
+    """Return the number of axes of each dataset, and the names of those that may be missing."""
+    known = {**dict.fromkeys(SCALARS, 0), **LISTS, **FIELDS}
+    if version == 1:
+        return known | dict.fromkeys(OF_SOME_SCENES, 1), set(OF_SOME_SCENES)
+    named = fields_of(_attribute(group, "fields", str))
+    axes = {name: rank + 1 for name, (rank, _) in named.items()}
+    for name in FIELDS.keys() & axes.keys():
+        if axes[name] != FIELDS[name]:
+            raise Refused("foreign", f"the field {name} is of rank {axes[name] - 1}")
+    return {**dict.fromkeys((*SCALARS, *ENERGIES), 0), **LISTS, **axes}, set()
+
+
+def fields_of(text: str) -> dict[str, tuple[int, bool]]:
+    """Return rank, and whether it may be missing, of each field in a JSON text."""
+    try:
+        found = {
+            name: (int(rank), bool(remade)) for name, (rank, remade) in json.loads(text).items()
+        }
+    except (ValueError, TypeError, AttributeError, RecursionError):
+        raise Refused("foreign", "its list of fields is not one") from None
+    reserved = {*SCALARS, *ENERGIES, *LISTS}
+    for name, (rank, _) in found.items():
+        if not NAME.fullmatch(name) or name in reserved or not 0 <= rank <= 2:
+            raise Refused("foreign", f"its list of fields has {name[:60]!a} of rank {rank}")
+    return found
+
+
+def _datasets(
+    group: h5py.Group, axes: dict[str, int], optional: set[str]
+) -> dict[str, h5py.Dataset]:
+    """Return the datasets of /Checkpoint, not yet read."""
+    there = {name for name in axes if name.encode() in group.id}
+    missing = axes.keys() - there - optional
     if missing or group.id.get_num_objs() != len(there):
         lacks = f": {', '.join(sorted(missing))} missing" if missing else ""
-        raise Refused("foreign", f"/{GROUP} has not the datasets of a checkpoint{lacks}")
+        raise Refused("foreign", f"/{GROUP} does not hold the datasets of a checkpoint{lacks}")
     for name in there:
         if not _is_hard(group.id, name.encode()):
-            raise Refused("foreign", f"{name} is a link to somewhere else")
+            raise Refused("foreign", f"{name} is a link to another place")
     return {name: h5py.Dataset(h5py.h5d.open(group.id, name.encode())) for name in sorted(there)}
 
 
@@ -126,12 +164,12 @@ def _is_hard(parent, name: bytes) -> bool:
     return parent.links.get_info(name).type == h5py.h5l.TYPE_HARD
 
 
-def _check(name: str, dataset: h5py.Dataset, size: int) -> None:
-    """Raise Refused where the dataset is not of the kind that checkpoints have."""
+def _check(name: str, axes: int, dataset: h5py.Dataset, size: int) -> None:
+    """Raise Refused if type, shape, filters or storage differ from those of a checkpoint."""
     kind = np.dtype(np.int64 if name in INTEGERS else np.float64)
     if dataset.dtype != kind or dataset.id.get_type().get_size() != kind.itemsize:
         raise Refused("foreign", f"{name} is of type {dataset.dtype.str}, expected {kind.str}")
-    if len(dataset.shape or ()) != AXES[name] or dataset.shape is None:
+    if len(dataset.shape or ()) != axes or dataset.shape is None:
         raise Refused("foreign", f"{name} has the shape {dataset.shape}")
     plan = dataset.id.get_create_plist()
     filters = [plan.get_filter(i)[0] for i in range(plan.get_nfilters())]
@@ -156,19 +194,19 @@ def _attribute(group: h5py.Group, name: str, kind: type):
         else attribute.dtype.kind in "iu"
     )
     if attribute.shape != () or not fits:
-        raise Refused("foreign", f"the attribute {name} is not one {kind.__name__}")
+        raise Refused("foreign", f"the attribute {name} is not a single {kind.__name__}")
     return group.attrs[name]
 
 
 def _limit(size: int, seconds: float) -> None:
-    """Set the limits of this process, which has imported all it needs."""
+    """Limit the time and memory of this process, after its imports."""
     limits = {resource.RLIMIT_CPU: int(seconds) + 1, resource.RLIMIT_CORE: 0}
     try:
         with open("/proc/self/statm") as file:
             used = int(file.read().split()[0]) * os.sysconf("SC_PAGE_SIZE")
         limits[resource.RLIMIT_AS] = used + MEMORY + MEMORY_A_BYTE * size
     except OSError:
-        pass  # no such account on this system: the time alone is limited
+        pass  # this system has no /proc: only the time is limited
     for which, most in limits.items():
         hard = resource.getrlimit(which)[1]
         most = most if hard == resource.RLIM_INFINITY else min(most, hard)
@@ -176,7 +214,7 @@ def _limit(size: int, seconds: float) -> None:
 
 
 def main() -> int:
-    """Read the file on standard input; says on standard output why not, as JSON."""
+    """Read the file on standard input; print the reason for a refusal as JSON."""
     version, seconds = int(sys.argv[1]), float(sys.argv[2])
     _limit(os.fstat(0).st_size, seconds)
     try:

@@ -1,52 +1,55 @@
-"""Whether the numbers of a checkpoint are those of a state that a run can have.
+"""Checks that the numbers in a checkpoint form a valid state.
 
-What compiled code takes on trust is checked here: lengths, order of magnitude, IDs, places.
+Compiled code does not check its arguments, so lengths, signs, magnitudes, IDs and positions are
+checked here.
 """
 
 import numpy as np
 
 from sph.neighbours.lists import MAX_PARTICLES
 
-POSITIVE = ("mass", "support", "density", "list_support")
-AT_LEAST_ZERO = ("internal_energy", "alpha")
-# Far above the skin of any run (sph.neighbours.search.best_skin), which is below 1.
+# Far above the skin of any run, which is below 1 (sph.neighbours.search.best_skin).
 MOST_SKIN = 10.0
-MOST_STEPS = 2**53  # beyond which the history, of float64, cannot count
+MOST_STEPS = 2**53  # the history holds float64, which counts exactly up to here
 
 
 def faults_of_shape(checkpoint) -> list[str]:
-    """What is wrong with the shapes and IDs of a checkpoint, in words."""
+    """Return descriptions of what is wrong with the shapes and IDs of a checkpoint."""
     particles, config = checkpoint.particles, checkpoint.config
     n, D = particles.id.size, config.problem.dimension
     if not 1 <= n <= MAX_PARTICLES:
         return [f"it has {n} particles, expected 1 to {MAX_PARTICLES}"]
     found = []
-    # alpha_rate and pressure are made where a restart has changed the scene, and left out
-    evolves = config.physics.viscosity_model().evolves
-    if evolves != (particles.alpha is not None):
-        there = "missing" if evolves else "there"
-        found.append(f"alpha is {there}, which its configuration does not fit")
     for name, array in _arrays(checkpoint).items():
-        expected = (n,) if array.ndim == 1 else (D, n)
+        expected = (D,) * (array.ndim - 1) + (n,)
         if array.shape != expected:
             found.append(f"{name} has the shape {array.shape}, expected {expected}")
     ids = np.sort(particles.id)
     if ids[0] < 1 or np.any(ids[1:] == ids[:-1]):
-        found.append("its particle IDs are not all different and above 0")
+        found.append("its particle IDs are not all positive and unique")
     return found
 
 
 def faults_of_value(checkpoint) -> list[str]:
-    """What is wrong with the numbers of a checkpoint whose shapes are right, in words."""
+    """Return descriptions of what is wrong with the values of a checkpoint with valid shapes."""
     found = [f"{name} = {value}" for name, value in _bad_scalars(checkpoint)]
+    above, at_least = _bounds(checkpoint)
     for name, array in _arrays(checkpoint).items():
         if not np.all(np.isfinite(array)):
             found.append(f"{name} is not finite everywhere")
-        elif name in POSITIVE and not array.min() > 0.0:
-            found.append(f"{name} is not above 0 everywhere")
-        elif name in AT_LEAST_ZERO and array.min() < 0.0:
-            found.append(f"{name} is below 0 somewhere")
+        elif name in above and not array.min() > above[name]:
+            found.append(f"{name} is not above {above[name]:g} everywhere")
+        elif name in at_least and array.min() < at_least[name]:
+            found.append(f"{name} is below {at_least[name]:g} somewhere")
     return found or _faults_of_place(checkpoint)
+
+
+def _bounds(checkpoint) -> tuple[dict[str, float], dict[str, float]]:
+    """Return what the values of fields must be above, and at least."""
+    fields = checkpoint.particles.fields
+    above = {field.name: field.above for field in fields if field.above is not None}
+    at_least = {field.name: field.at_least for field in fields if field.at_least is not None}
+    return {"list_support": 0.0, **above}, at_least
 
 
 def _bad_scalars(checkpoint):
@@ -61,7 +64,10 @@ def _bad_scalars(checkpoint):
 
 
 def _faults_of_place(checkpoint) -> list[str]:
-    """Particles outside a closed axis: lists are built of those inside, which may then move."""
+    """Return descriptions of positions outside the domain along closed axes.
+
+    Lists are built from positions inside; particles may leave by what the skin allows.
+    """
     problem, found = checkpoint.config.problem, []
     moves = (1.0 + checkpoint.list_skin) * checkpoint.list_support
     places = {"list_position": 0.0, "position": moves}

@@ -1,1 +1,1 @@
-"""Problems: one file each, its `Problem` the keys of [problem], the initial and the exact state."""
+"""Problems, one file each: its class `Problem` gives the keys, initial state and exact solution."""

@@ -1,10 +1,10 @@
-"""What every problem has: shared keys, and the questions the program asks of a problem."""
+"""Base class of all problems: the shared keys, and the methods that the program calls."""
 
 import math
 from typing import Any, ClassVar, Literal, NamedTuple
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field
 
 Boundary = Literal["periodic", "mirror", "open"]
 
@@ -19,9 +19,9 @@ class InitialState(NamedTuple):
 
 
 class Limit(NamedTuple):
-    """A figure of the summary that must stay below `bound`, with the reason for the number.
+    """A limit on a number in the summary: at most `bound`, or at least `bound` if `at_least`.
 
-    Or, with `at_least`, not fall below it.
+    reason: why the limit has this value; shown to the user.
     """
 
     bound: float
@@ -29,14 +29,15 @@ class Limit(NamedTuple):
     at_least: bool = False
 
     def holds(self, value: float) -> bool:
-        """Whether `value` is within; NaN never is."""
+        """Return whether `value` is within the limit; False for NaN."""
         return value >= self.bound if self.at_least else value <= self.bound
 
 
 class Section(BaseModel):
-    """A table of the configuration: strict about types and unknown keys, immutable once read.
+    """A table of the configuration, with strict types, no unknown keys, and immutable.
 
-    restart: the class of its keys in a restart (`sph.config.restarts`), unless a key has its own.
+    restart: the class of all its keys in a restart (`sph.config.restarts`); None if each key
+    declares its own.
     """
 
     restart: ClassVar[str | None] = None
@@ -45,18 +46,18 @@ class Section(BaseModel):
 
 
 class Problem(Section):
-    """Keys shared by all problems. A problem's file gives its own defaults for them.
+    """Keys shared by all problems. The file of a problem gives its own defaults for them.
 
-    Class attributes a problem may set:
-      defaults   this problem's defaults for keys of other tables, e.g. {"physics.gamma": 1.4}
-      limits     figures of the summary ("energy_drift", "l1.density", …) that its shipped
-                 configuration must keep, each with the reason for the number
-      ideal_gas  whether its solution is that of an ideal gas, so that others are refused
-      radial     whether, in 2-D and 3-D, the solution depends on the distance from `centre` alone
-      swamped    figures beyond whose bound the problem's small signal is lost in numerical noise
-      truth      what `exact` is, in words and as the label of a line: an exact solution, or a
-                 reference that another method computes
-      profiled   whether profiles over x, or that distance, show the solution; maps do else
+    Class attributes that a problem may set:
+      defaults   defaults of keys in other tables, e.g. {"physics.gamma": 1.4}
+      limits     limits on numbers in the summary ("energy_drift", "l1.density", …) for the shipped
+                 configuration
+      ideal_gas  whether the problem requires an ideal gas
+      radial     whether, in 2-D and 3-D, the solution depends only on the distance from `centre`
+      swamped    limits beyond which the problem's small signal is lost in numerical noise
+      truth      what `exact` returns, as a phrase and as a label in figures: an exact solution, or
+                 a reference solution from another method
+      profiled   whether figures show profiles over x or over the distance; otherwise, maps
     """
 
     restart: ClassVar[str | None] = "refused"
@@ -68,111 +69,148 @@ class Problem(Section):
     truth: ClassVar[tuple[str, str]] = ("the exact solution", "exact")
     profiled: ClassVar[bool] = True
 
-    name: str = Field(description="which problem: `sph list` names them")
+    name: str = Field(description="name of the problem; `sph list` shows all problems")
     dimension: int = Field(ge=1, le=3, description="number of space dimensions")
     n: int = Field(
-        ge=2, le=100_000_000, description="particles in all; the lattice takes the nearest it can"
+        ge=2,
+        le=100_000_000,
+        description="number of particles; the lattice uses the nearest number that fits",
     )
     domain: list[float] | list[list[float]] = Field(
-        description="[lo, hi] for every axis alike, or one [lo, hi] per axis"
+        description="ends of the box: [lo, hi] for all axes, or a list with one [lo, hi] per axis"
     )
     boundary: Boundary | list[Boundary] = Field(
-        description='"periodic", "mirror" (reflecting wall) or "open"; a list for one per axis'
+        description='"periodic", "mirror" (reflecting wall) or "open" (vacuum outside) for all '
+        "axes, or a list with one per axis"
     )
 
     @property
     def box(self) -> np.ndarray:
-        """(D, 2) lower and upper end of the domain along each axis."""
+        """(D, 2) lower and upper ends of the domain along each axis."""
         domain = np.array(self.domain, dtype=float)
         return np.tile(domain, (self.dimension, 1)) if domain.ndim == 1 else domain
 
     @property
     def boundaries(self) -> tuple[str, ...]:
-        """The boundary of each axis."""
-        one = isinstance(self.boundary, str)
-        return (self.boundary,) * self.dimension if one else tuple(self.boundary)
+        """The boundary of each axis, D names."""
+        if isinstance(self.boundary, str):
+            return (self.boundary,) * self.dimension
+        return tuple(self.boundary)
 
     @property
     def centre(self) -> np.ndarray:
-        """(D,) the middle of the box."""
+        """(D,) centre of the box."""
         return self.box.mean(axis=1)
 
     def fills_box(self, eos) -> bool:
-        """Whether gas fills the box at all times: in a closed one, sum m/rho is then its volume."""
+        """Return whether gas fills the box at all times, so that sum m/rho equals its volume."""
         return True
 
     def allowed(self) -> dict[str, Limit]:
-        """The limits that a run of this very configuration must keep, or its summary warns."""
+        """Return the limits that apply to a run with these keys; the summary warns if exceeded."""
         return self.limits
 
     @property
     def gamma_below(self) -> float:
-        """What gamma must stay below for the problem to have its solution."""
+        """Upper bound (exclusive) of gamma, above which the exact solution does not exist."""
         return math.inf
 
     def initial(self, eos) -> InitialState:
-        """The particles at t = 0 for that equation of state."""
+        """Return the particles at t = 0 for the equation of state `eos`."""
         raise NotImplementedError
 
     def exact(self, eos, time: float, position: np.ndarray) -> dict[str, np.ndarray] | None:
-        """Exact density, velocity (D, N), pressure, internal_energy at (D, N) points, or None.
+        """Return exact density (N,), velocity (D, N), pressure and internal_energy (N,), or None.
 
-        Callers ask `sph.analysis.truth` first, which knows where it does not hold.
+        position: (D, N) points. Callers use `sph.analysis.truth`, which checks where the exact
+        solution is valid.
         """
         return None
 
     def departs(self, physics) -> str | None:
-        """Why this physics is not that of the exact solution and of the theory, or None.
+        """Return why the exact solution and the theory do not apply to [physics], or None.
 
         physics: the table of that name of the configuration.
         """
-        return other_physics(physics, "external", "heating")
+        return other_physics(physics)
 
     def exact_ends(self, eos) -> tuple[float, str]:
-        """The time until which `exact` holds, and what ends it: the words after "when"."""
+        """Return the time until which `exact` is valid, and the reason, which completes "when"."""
         return math.inf, ""
 
     def undisturbed(self, eos, time: float) -> np.ndarray:
-        """(D, 2): between which ends along each axis no wave from the domain's ends has come.
+        """Return (D, 2), the range of each axis not yet reached by waves from the domain's ends.
 
-        Infinite along an axis whose ends send none. `exact` holds there alone.
+        Infinite along an axis whose ends send no waves. `exact` is valid only in this range.
         """
         return np.tile([-math.inf, math.inf], (self.dimension, 1))
 
     def error_region(self, eos, time: float, position: np.ndarray) -> tuple[np.ndarray, str]:
-        """(N,) mask of the particles over which errors are taken, and that region in words."""
+        """Return a mask (N,) of the particles over which errors are averaged, and its name."""
         return np.ones(position.shape[1], dtype=bool), "the whole domain"
 
     def diagnostics(self, particles) -> dict[str, float]:
-        """Further columns of the history, e.g. a mode's amplitude; the same keys at every step."""
+        """Return additional columns of the history, e.g. the amplitude of a mode.
+
+        The keys must be the same at every step.
+        """
         return {}
 
     def report(self, eos, time: float, particles, pressure) -> dict[str, float]:
-        """Further figures of the summary at the end of a run that need no exact solution."""
+        """Return additional numbers for the summary that need no exact solution."""
         return {}
 
     def compare(self, eos, time: float, particles, pressure) -> dict[str, float]:
-        """Figures beside the exact solution, or beside theory: asked for where these hold alone."""
+        """Return numbers that compare the result with the exact solution or theory.
+
+        Called only if these are valid.
+        """
         return {}
 
     def theory(self, eos, times: np.ndarray) -> dict[str, np.ndarray]:
-        """What theory says of columns of the history at `times` (M,), rising: drawn beside them.
+        """Return theoretical values of columns of the history at ascending `times` (M,).
 
-        Asked for where the physics does not depart from that of the theory alone.
+        They are drawn in the figure of the history. Called only if `departs` returns None.
         """
         return {}
 
     def over_time(self, eos, history: dict[str, np.ndarray]) -> dict[str, float]:
-        """Figures from the whole history, whose columns are (steps,), e.g. a rate of growth.
+        """Return numbers computed from the history, whose columns are (steps,), e.g. a growth rate.
 
-        Asked for where the physics does not depart from that of the theory alone.
+        Called only if `departs` returns None.
         """
         return {}
 
 
-def other_physics(physics, *keys: str) -> str | None:
-    """That the first of the keys of [physics] that is given is not in the exact solution."""
-    for key in keys:
-        if getattr(physics, key) is not None:
-            return f"the exact solution is that of gas without physics.{key}"
+def other_physics(physics, besides: str = "") -> str | None:
+    """Return that a given part of [physics], except `besides`, is not in the exact solution."""
+    for key in physics.given(changes_solution=True):
+        if key != besides:
+            return f"the exact solution does not include physics.{key}"
     return None
+
+
+def wide(least: float) -> AfterValidator:
+    """Annotates the domain of a vortex that a narrower periodic box would cut."""
+
+    def check(domain):
+        try:
+            widths = np.diff(np.array(domain, dtype=float))
+        except ValueError:  # rows of different lengths: the configuration says so of every problem
+            return domain
+        if np.any(widths < least):
+            raise ValueError(f"{domain} is narrower than the vortex: expected at least {least:g}")
+        return domain
+
+    return AfterValidator(check)
+
+
+def only(domain: list[float]) -> AfterValidator:
+    """Annotates the domain of a problem that is set up for no other."""
+
+    def check(given):
+        if given not in (domain, [domain, domain]):
+            raise ValueError(f"this problem is set up for {domain} along both axes only")
+        return given
+
+    return AfterValidator(check)

@@ -1,9 +1,9 @@
-"""Two blast waves that run into each other between reflecting walls.
+"""Two blast waves that collide between reflecting walls.
 
-Woodward & Colella (1984), J. Comput. Phys. 54, 115. Pressures of 1000 and 100 at either end of a
-tube of cold gas: strong shocks, their reflections from the walls, their collision at t = 0.028 and
-the contacts that come of it, all within a few particles of each other. There is no exact solution:
-errors are against a finite-volume code that moves with the gas.
+Woodward & Colella (1984), J. Comput. Phys. 54, 115. High pressures of 1000 and 100 at the two ends
+of a tube of cold gas drive strong shocks, which are reflected by the walls and collide at
+t = 0.028. Shocks and contacts are then only a few particles apart. There is no exact solution:
+errors are computed against a Lagrangian finite-volume solution.
 """
 
 from functools import lru_cache
@@ -21,14 +21,14 @@ _SHARED = base.Problem.model_fields
 DENSITY = 1.0
 DIAPHRAGMS = (0.1, 0.9)
 PRESSURES = (1000.0, 0.01, 100.0)
-# Of the reference, a multiple of 10, so that the diaphragms are faces. Its own relative L1 error of
-# density is 0.0012 at t = 0.038, measured against 25600 cells (0.0026 with 3200, 0.0046 with 1600);
-# that of 400 particles is 0.034 beside it and 0.037 beside 25600 cells.
+# Cells of the reference, a multiple of 10, so that the diaphragms are faces. Its relative L1 error
+# of density is 0.0012 at t = 0.038, measured against 25600 cells (0.0026 with 3200, 0.0046 with
+# 1600). The error of 400 particles is 0.034 against this reference, 0.037 against 25600 cells.
 CELLS = 6400
 
 
 class Problem(base.Problem):
-    """Strong shocks from both ends of a closed tube, which collide."""
+    """Two blast waves from the ends of a closed tube, which collide."""
 
     defaults: ClassVar = {
         "physics.gamma": 1.4,
@@ -38,27 +38,29 @@ class Problem(base.Problem):
     }
     truth: ClassVar = finite_volume.TRUTH
     limits: ClassVar = {
-        "energy_drift": base.Limit(1e-4, "as in the shock tubes; 2e-5 was measured"),
+        "energy_drift": base.Limit(1e-4, "as in the shock tubes; measured: 2e-5"),
         "density_L1_relative": base.Limit(
-            0.05, "0.034 was measured; the averaged gradient of grad_h gives 0.060"
+            0.05, "measured: 0.034, and 0.060 with the averaged gradient of grad_h"
         ),
     }
 
     name: Literal["blast_waves"] = "blast_waves"
     dimension: Literal[1] = Field(default=1, description="number of space dimensions")
     n: Annotated[int, _SHARED["n"]] = 400
-    domain: list[float] = Field(default=[0.0, 1.0], description="[0, 1], as published")
+    domain: list[float] = Field(
+        default=[0.0, 1.0], description="[0, 1], as published; no other domain is allowed"
+    )
     boundary: Literal["mirror"] = Field(default="mirror", description="reflecting walls")
 
     @field_validator("domain")
     @classmethod
     def _is_published(cls, ends):
         if ends != [0.0, 1.0]:
-            raise ValueError(f"{ends}: expected [0, 1], where the walls of this problem are")
+            raise ValueError(f"{ends}: expected [0, 1], the only domain of this problem")
         return ends
 
     def initial(self, eos) -> base.InitialState:
-        """Particles of one mass at rest in the middles of their shares of the tube."""
+        """Return particles of equal mass and spacing, at rest."""
         x = (np.arange(self.n) + 0.5) / self.n
         energy = eos.internal_energy(DENSITY, _pressure(x))
         position = x[None]
@@ -66,7 +68,7 @@ class Problem(base.Problem):
         return base.InitialState(position, np.zeros_like(position), mass, energy)
 
     def exact(self, eos, time: float, position: np.ndarray) -> dict[str, np.ndarray] | None:
-        """The reference at (D, N) positions; None for gases that it does not take."""
+        """Return the reference solution at (D, N) positions; None if the gas has no gamma law."""
         if not is_gamma_law(eos):
             return None
         density, speed, pressure = _reference(eos, time).at(position[0])
@@ -81,7 +83,7 @@ class Problem(base.Problem):
         return {"peak_density": float(particles.density.max())}
 
     def compare(self, eos, time: float, particles, pressure) -> dict[str, float]:
-        """The relative error of density: sum V |error| over sum V rho."""
+        """Return density_L1_relative: sum V |error| / sum V rho."""
         exact = self.exact(eos, time, particles.position)
         if exact is None:
             return {}
@@ -91,7 +93,7 @@ class Problem(base.Problem):
 
 
 def _pressure(x: np.ndarray) -> np.ndarray:
-    """(N,) at t = 0."""
+    """Return the pressure (N,) at t = 0."""
     return np.select([x < DIAPHRAGMS[0], x < DIAPHRAGMS[1]], PRESSURES[:2], PRESSURES[2])
 
 

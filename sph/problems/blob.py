@@ -1,8 +1,8 @@
-"""A dense cloud in a supersonic wind, in pressure balance with it.
+"""A dense cloud in a supersonic wind, in pressure equilibrium with the wind.
 
-Agertz et al. (2007), MNRAS 380, 963: in grid codes the cloud is torn apart within some two times of
-growth of the Kelvin-Helmholtz instability; classical SPH keeps part of it for ever, as contacts
-there have a surface tension.
+Agertz et al. (2007), MNRAS 380, 963. In grid codes the Kelvin-Helmholtz instability destroys the
+cloud within about two growth times. In classical SPH part of the cloud survives, because contacts
+have a spurious surface tension.
 """
 
 from typing import Annotated, ClassVar, Literal
@@ -10,19 +10,20 @@ from typing import Annotated, ClassVar, Literal
 import numpy as np
 from pydantic import Field, model_validator
 
-from sph import lattice as placement
 from sph.problems import base
+from sph.problems.support import lattice as placement
 
 _SHARED = base.Problem.model_fields
 
 DENSITY = PRESSURE = 1.0  # of the wind
-LENGTH = 4.0  # of the box along the wind, in widths
-# Agertz et al., section 3.1: what counts as cloud, of the first density and the wind's temperature
+LENGTH = 4.0  # of the box along the wind, in widths of the box
+# Gas counts as cloud above this fraction of the initial cloud density and below this fraction of
+# the wind's temperature (Agertz et al., section 3.1).
 STILL_DENSE, STILL_COLD = 0.64, 0.9
 
 
 class Problem(base.Problem):
-    """A cloud of cold gas blown upon by a wind along x; how much of it survives."""
+    """A dense, cold cloud in a supersonic wind along x: how much of the cloud survives."""
 
     defaults: ClassVar = {
         "physics.gamma": 5.0 / 3.0,
@@ -32,12 +33,12 @@ class Problem(base.Problem):
     }
     limits: ClassVar = {
         "energy_drift": base.Limit(
-            1e-3, "two thirds of the energy are the wind's motion, a part of which turns to heat"
+            1e-3, "two thirds of the energy is kinetic energy of the wind, part of which is heated"
         ),
-        "cloud_mass_fraction": base.Limit(
-            1.05, "gas that the wind heats and thins does not turn into cloud"
+        "cloud_mass_fraction": base.Limit(1.05, "heated and expanded gas must not count as cloud"),
+        "cloud_velocity": base.Limit(
+            1.0, "the wind cannot accelerate the cloud beyond the wind's speed"
         ),
-        "cloud_velocity": base.Limit(1.0, "the wind cannot drive the cloud faster than itself"),
     }
 
     name: Literal["blob"] = "blob"
@@ -47,26 +48,26 @@ class Problem(base.Problem):
         default=[-5.0, 5.0],
         min_length=2,
         max_length=2,
-        description="[lo, hi] across the wind; along it the box begins at lo, too, and is four "
-        "times as long",
+        description="[lo, hi] across the wind; along the wind, the box also begins at lo and is "
+        "four times as long",
     )
-    boundary: Literal["periodic"] = Field(default="periodic", description="of all axes")
+    boundary: Literal["periodic"] = Field(default="periodic", description="boundary of all axes")
     radius: float = Field(
-        default=1.0, gt=0.0, description="radius of the cloud, whose centre is half a width from lo"
+        default=1.0,
+        gt=0.0,
+        description="radius of the cloud; its centre is half a width of the box from lo",
     )
     density_ratio: float = Field(
-        default=10.0, gt=1, le=1e6, description="density of cloud over wind's"
+        default=10.0, gt=1, le=1e6, description="density of the cloud divided by that of the wind"
     )
-    mach: float = Field(
-        default=2.7, gt=0.0, description="speed of the wind over its speed of sound"
-    )
+    mach: float = Field(default=2.7, gt=0.0, description="Mach number of the wind")
 
     @model_validator(mode="after")
     def _cloud_fits(self):
         low, high = self.domain
         if 2.0 * self.radius >= high - low > 0.0:
             raise ValueError(
-                f"radius = {self.radius}: expected a cloud narrower than the box, {high - low:g}"
+                f"radius = {self.radius}: expected a diameter below the box's width, {high - low:g}"
             )
         return self
 
@@ -77,30 +78,30 @@ class Problem(base.Problem):
 
     @property
     def centre(self) -> np.ndarray:
-        """(D,) the middle of the cloud at t = 0."""
+        """(D,) centre of the cloud at t = 0."""
         return np.full(self.dimension, sum(self.domain) / 2)
 
     def wind(self, eos) -> float:
-        """Speed of the wind."""
+        """Return the speed of the wind."""
         return float(self.mach * eos.sound_speed(DENSITY, PRESSURE))
 
     def growth_time(self, eos) -> float:
-        """Time in which a wave as long as the cloud grows: 1.6 crushing times (their eq 3)."""
+        """Return the growth time of a mode as long as the cloud: 1.6 crushing times (eq 3)."""
         return 1.6 * 2.0 * self.radius * float(np.sqrt(self.density_ratio)) / self.wind(eos)
 
     def initial(self, eos) -> base.InitialState:
-        """Particles of one mass on two cubic lattices; those of the cloud come first."""
+        """Return particles of equal mass on two cubic lattices, those of the cloud first."""
         around = placement.fill(self.box, self._sites(), "cubic")
         mass = DENSITY * np.prod(np.diff(self.box)) / around.shape[1]
         around = around[:, self._distance(around) >= self.radius]
         cloud = self._cloud(mass)
         position = np.hstack([cloud, around])
-        state = self.exact(eos, 0.0, position)
+        state = self.exact(eos, 0.0, position) or {}
         each = np.full(position.shape[1], mass)
         return base.InitialState(position, state["velocity"], each, state["internal_energy"])
 
     def exact(self, eos, time: float, position: np.ndarray) -> dict[str, np.ndarray] | None:
-        """The initial state, at (D, N) positions; None later, when there is no exact solution."""
+        """Return the initial state at (D, N) positions; None for t > 0, which has no solution."""
         if time > 0.0:
             return None
         in_cloud = self._distance(position) < self.radius
@@ -116,9 +117,9 @@ class Problem(base.Problem):
         }
 
     def diagnostics(self, particles) -> dict[str, float]:
-        """cloud_mass_fraction: mass of gas still dense and cold over that of the cloud.
+        """Return cloud_mass_fraction: mass of dense, cold gas over the initial mass of the cloud.
 
-        The wind, nine tenths of the particles and more, has the median temperature (as u).
+        The wind has nine tenths of the particles or more, so the median of u is that of the wind.
         """
         u = particles.internal_energy
         dense = particles.density > STILL_DENSE * self.density_ratio * DENSITY
@@ -128,10 +129,10 @@ class Problem(base.Problem):
         return {"cloud_mass_fraction": float(particles.mass[dense & cold].sum() / cloud)}
 
     def report(self, eos, time: float, particles, pressure) -> dict[str, float]:
-        """What is left of the cloud and how fast it goes.
+        """Return cloud_mass_fraction, cloud_velocity and growth_times.
 
-        cloud_velocity: mean velocity along x of what was the cloud, over the wind's; growth_times:
-        the time in units of `growth_time`.
+        cloud_velocity: mean velocity along x of the particles that formed the cloud at t = 0, over
+        the speed of the wind; growth_times: time in units of `growth_time`.
         """
         count = self._cloud(particles.mass[0]).shape[1]
         velocity = particles.velocity[0, particles.id <= count].mean()
@@ -144,13 +145,13 @@ class Problem(base.Problem):
         return np.sqrt(((position - self.centre[:, None]) ** 2).sum(axis=0))
 
     def _sites(self) -> int:
-        """Sites of a lattice as in the wind over the whole box, for n particles in all."""
+        """Return the sites of the wind's lattice in the whole box, for n particles in total."""
         volume = np.prod(np.diff(self.box))
         cloud = (np.pi, 4.0 / 3.0 * np.pi)[self.dimension - 2] * self.radius**self.dimension
         return max(1, round(self.n / (1.0 + (self.density_ratio - 1.0) * cloud / volume)))
 
     def _cloud(self, mass: float) -> np.ndarray:
-        """Positions (D, N) of particles of that mass in the cloud, its middle a corner of cells."""
+        """Return positions (D, N) in the cloud of particles of that mass; no site at its centre."""
         spacing = (mass / (self.density_ratio * DENSITY)) ** (1.0 / self.dimension)
         half = int(np.ceil(self.radius / spacing))
         cube = half * spacing * np.array([[-1.0, 1.0]] * self.dimension)

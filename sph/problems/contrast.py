@@ -1,8 +1,8 @@
-"""Gas at rest at one pressure, whose density changes by orders of magnitude: nothing may happen.
+"""Steady-state test: gas at rest at uniform pressure, with a large density contrast.
 
-Either at a step, or evenly in the logarithm across the box; by the masses of evenly spaced
-particles, or by the spacing of particles of one mass. (A step in the spacing of particles of one
-mass is a shock tube with one pressure.)
+The density changes at a step, or exponentially across the box. It is represented by masses of
+evenly spaced particles, or by the spacing of particles of equal mass. (For a step between particles
+of equal mass, use `shock_tube` with equal pressures.)
 """
 
 from typing import Annotated, ClassVar, Literal
@@ -10,16 +10,16 @@ from typing import Annotated, ClassVar, Literal
 import numpy as np
 from pydantic import Field, model_validator
 
-from sph import lattice as placement
 from sph.problems import base
+from sph.problems.support import lattice as placement
 
 _SHARED = base.Problem.model_fields
 
-FEWEST_ACROSS = 4  # a support at eta = 1.6 is three spacings wide, and must not exceed the box
+FEWEST_ACROSS = 4  # a support radius is three spacings at eta = 1.6, and must not exceed the box
 
 
 class Problem(base.Problem):
-    """Hydrostatic gas with a large contrast of density along x: the null test of contacts."""
+    """Gas at rest with a large density contrast along x: a steady-state test of contacts."""
 
     defaults: ClassVar = {
         "physics.gamma": 5.0 / 3.0,
@@ -29,11 +29,13 @@ class Problem(base.Problem):
         "output.interval": 0.001,
     }
     limits: ClassVar = {
-        "energy_drift": base.Limit(1e-6, "gas at rest: heating is of second order in its velocity"),
-        "mach_number": base.Limit(0.05, "velocities of an error of pressure of some per cent"),
+        "energy_drift": base.Limit(
+            1e-6, "gas at rest: heating is of second order in the small velocities"
+        ),
+        "mach_number": base.Limit(0.05, "velocities from pressure errors of a few per cent"),
         "pressure_error": base.Limit(
             0.25,
-            "a kernel smooths the kink that a mirror makes of a gradient: 20 % there, 1 % in L1",
+            "kernels smooth the kink of the density at a mirror: 20 % there, 1 % in the L1 norm",
         ),
     }
 
@@ -41,35 +43,36 @@ class Problem(base.Problem):
     dimension: Annotated[int, _SHARED["dimension"]] = 1
     n: Annotated[int, _SHARED["n"]] = 200
     domain: list[float] | list[list[float]] = Field(
-        default=[0.0, 1.0], description="[lo, hi] for every axis alike, or one [lo, hi] per axis"
+        default=[0.0, 1.0],
+        description="ends of the box: [lo, hi] for all axes, or a list with one [lo, hi] per axis",
     )
     boundary: Literal["mirror"] = Field(
-        default="mirror", description="along x; y and z are periodic"
+        default="mirror", description="reflecting walls along x; y and z are periodic"
     )
-    ratio: float = Field(default=1e6, gt=1, description="densest over thinnest gas")
+    ratio: float = Field(default=1e6, gt=1, description="largest density divided by smallest")
     profile: Literal["step", "graded"] = Field(
         default="step",
-        description='"step": dense gas below the middle of x, thin above; "graded": the density '
-        "falls evenly in its logarithm",
+        description='"step": the density falls at the middle of x; "graded": the density falls '
+        "exponentially along x",
     )
     masses: Literal["equal", "equal_spacing"] = Field(
         default="equal_spacing",
-        description='"equal": one mass, and spacings after the density, which must be graded; '
-        '"equal_spacing": one spacing, and masses after the density',
+        description='"equal": equal masses, with spacings that follow the density (only with '
+        'profile = "graded"); "equal_spacing": equal spacings, with masses that follow the density',
     )
-    pressure: float = Field(default=1.0, gt=0.0, description="pressure everywhere")
+    pressure: float = Field(default=1.0, gt=0.0, description="uniform pressure")
 
     @model_validator(mode="after")
     def _holds_the_thin_gas(self):
         if self.masses == "equal" and self.profile == "step":
             raise ValueError(
-                'masses = "equal": expected profile = "graded" with it; for a step between '
-                "particles of one mass take shock_tube with one pressure on both sides"
+                'masses = "equal": expected profile = "graded". Try: for a step between particles '
+                "of equal mass, shock_tube with equal pressures on both sides"
             )
         if self.masses == "equal" and self._fewest_across() < FEWEST_ACROSS and self._is_box():
             raise ValueError(
-                f"n = {self.n} particles of one mass are {self._fewest_across()} spacings of the "
-                f"thinnest gas along an axis: expected {FEWEST_ACROSS}; take more particles, a "
+                f"n = {self.n}: with equal masses the box is only {self._fewest_across()} spacings "
+                f"of the thinnest gas wide; expected {FEWEST_ACROSS}. Try: more particles, a "
                 'smaller ratio, or masses = "equal_spacing"'
             )
         return self
@@ -83,7 +86,7 @@ class Problem(base.Problem):
         return ("mirror",) + ("periodic",) * (self.dimension - 1)
 
     def initial(self, eos) -> base.InitialState:
-        """The densest gas has density 1. Particles lie on a cubic lattice, or in layers of such."""
+        """Return particles on a cubic lattice or in layers. The largest density is 1."""
         if self.masses == "equal":
             position = self._layers()
             n = position.shape[1]
@@ -96,7 +99,7 @@ class Problem(base.Problem):
         return base.InitialState(position, state["velocity"], mass, state["internal_energy"])
 
     def exact(self, eos, time: float, position: np.ndarray) -> dict[str, np.ndarray]:
-        """The initial state for ever, at (D, N) positions."""
+        """Return the initial state at (D, N) positions, which is steady."""
         density = self._density(position)
         pressure = np.full(density.size, self.pressure)
         return {
@@ -107,10 +110,10 @@ class Problem(base.Problem):
         }
 
     def report(self, eos, time: float, particles, pressure) -> dict[str, float]:
-        """How far the gas is from rest.
+        """Return mach_number, density_ratio and support_ratio.
 
-        mach_number: the largest velocity over the sound speed there; support_ratio: the widest
-        support over the narrowest.
+        mach_number: largest ratio of velocity to local sound speed; the others: largest density
+        or support radius over the smallest.
         """
         speed = np.sqrt((particles.velocity**2).sum(axis=0))
         sound = eos.sound_speed(particles.density, pressure)
@@ -121,7 +124,7 @@ class Problem(base.Problem):
         }
 
     def compare(self, eos, time: float, particles, pressure) -> dict[str, float]:
-        """pressure_error: the largest |P/P_0 - 1|."""
+        """Return pressure_error: the largest |P/P_0 - 1|."""
         return {"pressure_error": float(np.abs(pressure / self.pressure - 1.0).max())}
 
     # --- the profile, with s = 0 to 1 along x ---
@@ -137,29 +140,29 @@ class Problem(base.Problem):
         return self.ratio**-s
 
     def _mass(self, s):
-        """Mass below s of graded gas, for a cross section and a length of 1."""
+        """Return the mass of graded gas below s, for unit cross section and length."""
         return (1.0 - self.ratio**-s) / np.log(self.ratio)
 
     def _place(self, mass):
-        """Inverse of `_mass`."""
+        """Return s at which `_mass` is `mass`."""
         return -np.log1p(-mass * np.log(self.ratio)) / np.log(self.ratio)
 
-    # --- layers of particles of one mass ---
+    # --- layers of particles of equal mass ---
 
     def _volume(self) -> float:
-        """Volume of the box."""
+        """Return the volume of the box."""
         return float(np.prod(np.diff(self.box)))
 
     def _fewest_across(self) -> int:
-        """Spacings of the thinnest gas along the shortest axis."""
+        """Return the number of spacings of the thinnest gas along the shortest axis."""
         thinnest = self._mass(1.0) * self._volume() / self.n * self.ratio
         return int(np.diff(self.box).min() / thinnest ** (1.0 / self.dimension))
 
     def _layers(self) -> np.ndarray:
-        """Positions (D, N) of particles of one mass in layers across x, near n of them in all.
+        """Return positions (D, N) of about n particles of equal mass, in layers across x.
 
-        Each layer has whole numbers of particles across and takes up the mass of these; the last
-        one ends at the box, for which masses are scaled by a little.
+        Each layer has whole numbers of particles across and contains their mass. Masses are scaled
+        slightly so that the last layer ends at the end of the box.
         """
         widths = np.diff(self.box)[1:, 0]
         total = self._mass(1.0)
@@ -171,7 +174,7 @@ class Problem(base.Problem):
             counts.append(across)
             below.append(below[-1] + total / self.n * float(np.prod(across)))
         if len(counts) > 1 and below[-1] - total > 0.5 * (below[-1] - below[-2]):
-            counts.pop(), below.pop()  # less than half of the last layer would be filled
+            counts.pop(), below.pop()  # the last layer would be less than half full
         edges = np.array(below) * (total / below[-1])
         middles = self._x(self._place(0.5 * (edges[1:] + edges[:-1])))
         return np.hstack(
@@ -179,7 +182,7 @@ class Problem(base.Problem):
         )
 
     def _layer(self, x: float, across: tuple[int, ...]) -> np.ndarray:
-        """Positions of one layer at x, a grid of `across` cells."""
+        """Return positions of a layer at x, a grid of `across` cells."""
         if not across:
             return np.array([[x]])
         in_layer = placement.grid(self.box[1:], "cubic", across)

@@ -1,7 +1,7 @@
-"""Free expansion of a ball of gas into vacuum: all internal energy becomes motion.
+"""Free expansion of a ball of gas into vacuum, which converts all internal energy to motion.
 
-The density falls to zero at the surface such that the gas stays similar to itself for ever
-(Ovsyannikov 1956; Dyson 1968), see `sph.exact.expanding_ball`.
+The density falls to zero at the surface in such a way that the expansion is self-similar
+(Ovsyannikov 1956; Dyson 1968; see `sph.exact.expanding_ball`).
 """
 
 from typing import Annotated, ClassVar, Literal
@@ -9,24 +9,23 @@ from typing import Annotated, ClassVar, Literal
 import numpy as np
 from pydantic import Field, field_validator
 
-from sph import lattice as placement
 from sph.exact import expanding_ball
 from sph.problems import base
-from sph.problems.noh import CUBE_OVER_BALL
+from sph.problems.support import lattice as placement
 
 _SHARED = base.Problem.model_fields
 
-KEPT = 0.8  # of the radius: errors are taken within, where the density is above a fifth
+KEPT = 0.8  # of the radius: errors are averaged inside, where the density is above a fifth
 
 
 class Problem(base.Problem):
-    """A ball of gas that expands into vacuum from rest and stays similar to itself."""
+    """A ball of gas that expands self-similarly from rest into vacuum."""
 
     defaults: ClassVar = {
         "physics.gamma": 5.0 / 3.0,
         "physics.alpha": 1.0,
         "physics.C": 0.1,
-        "physics.max_support": 10.0,  # as the gas thins, its supports outgrow the first ball
+        "physics.max_support": 10.0,  # support radii grow beyond the initial ball
         "time.end": 5.0,
         "output.interval": 1.0,
     }
@@ -34,13 +33,13 @@ class Problem(base.Problem):
     radial: ClassVar = True
     limits: ClassVar = {
         "energy_drift": base.Limit(
-            1e-3, "leapfrog's on some 60 steps: 7e-4 at C = 0.1, and as C squared (1.5e-3 at 0.15)"
+            1e-3, "the leapfrog with about 60 steps: 7e-4 at C = 0.1, and proportional to C squared"
         ),
         "front_speed_over_bound": base.Limit(
-            1.0, "nothing leaves a gas at rest faster than 2 c/(gamma - 1)"
+            1.0, "gas expands from rest at most at 2 c/(gamma - 1)"
         ),
         "kinetic_share_error": base.Limit(
-            0.002, "4e-4 was measured; heat from viscosity would become motion later, too"
+            0.002, "measured: 4e-4; viscous heating would delay the conversion to motion"
         ),
     }
 
@@ -49,16 +48,16 @@ class Problem(base.Problem):
     n: Annotated[int, _SHARED["n"]] = 4200
     domain: list[float] | list[list[float]] = Field(
         default=[-1.0, 1.0],
-        description="[lo, hi] for every axis alike, or one per axis: the ball fills it from its "
-        "middle to the nearest end",
+        description="ends of the box: [lo, hi] for all axes, or a list with one [lo, hi] per axis; "
+        "the ball is centred and reaches the nearest ends",
     )
-    boundary: Literal["open"] = Field(default="open", description="vacuum on all sides")
+    boundary: Literal["open"] = Field(default="open", description="vacuum outside, on all sides")
     density: float = Field(default=1.0, gt=0.0, description="density at the centre at t = 0")
     pressure: float = Field(default=1.0, gt=0.0, description="pressure at the centre at t = 0")
     lattice: Literal["cubic", "hexagonal", "bcc", "relaxed"] = Field(
         default="cubic",
-        description='"cubic", "hexagonal" (2-D), "bcc" (3-D) or "relaxed", a glass; stretched '
-        "along the radius to the density",
+        description='initial lattice: "cubic", "hexagonal" (2-D), "bcc" (3-D), or "relaxed", a '
+        "disordered glass; it is stretched along the radius to give the density",
     )
 
     @field_validator("lattice")
@@ -72,10 +71,10 @@ class Problem(base.Problem):
         return float((self.box[:, 1] - self.box[:, 0]).min() / 2)
 
     def initial(self, eos) -> base.InitialState:
-        """Particles of one mass, from a ball of lattice in which radii were moved outward or in."""
+        """Return particles of equal mass, from a ball of a lattice that is stretched radially."""
         dimension = self.dimension
         cube = np.array([[-1.0, 1.0]] * dimension)
-        sites = max(1, round(self.n * CUBE_OVER_BALL[dimension - 1]))
+        sites = max(1, round(self.n * placement.CUBE_OVER_BALL[dimension - 1]))
         position = placement.fill(cube, sites, self.lattice, even=True)
         distance = np.sqrt((position**2).sum(axis=0))
         within = (distance < 1.0) & (distance > 0.0)
@@ -88,7 +87,7 @@ class Problem(base.Problem):
         return base.InitialState(position, np.zeros_like(position), np.full(n, mass / n), energy)
 
     def exact(self, eos, time: float, position: np.ndarray) -> dict[str, np.ndarray]:
-        """The self-similar expansion, at (D, N) positions; nothing outside its radius."""
+        """Return the self-similar expansion at (D, N) positions; vacuum outside its radius."""
         radius, speed = self._radius(eos, time)
         offset = position - self.centre[:, None]
         inside = np.maximum(0.0, 1.0 - (offset**2).sum(axis=0) / radius**2)
@@ -103,16 +102,16 @@ class Problem(base.Problem):
         }
 
     def error_region(self, eos, time: float, position: np.ndarray) -> tuple[np.ndarray, str]:
-        """The gas but for its thin outer part, whose kernels reach into the vacuum."""
+        """Return the inner part; in the outer part kernels reach into the vacuum."""
         reach = KEPT * self._radius(eos, time)[0]
         offset = position - self.centre[:, None]
         return (offset**2).sum(axis=0) < reach**2, f"r < {reach:.4g} around the centre"
 
     def report(self, eos, time: float, particles, pressure) -> dict[str, float]:
-        """Front and energies.
+        """Return radius, front_speed and kinetic_share.
 
-        front_speed: the largest velocity outward. kinetic_share: kinetic energy over kinetic and
-        internal energy, which tends to 1.
+        front_speed: largest outward velocity; kinetic_share: kinetic energy over the sum of kinetic
+        and internal energy, which tends to 1.
         """
         offset = particles.position - self.centre[:, None]
         distance = np.sqrt((offset**2).sum(axis=0))
@@ -126,10 +125,10 @@ class Problem(base.Problem):
         }
 
     def compare(self, eos, time: float, particles, pressure) -> dict[str, float]:
-        """The same beside the exact solution.
+        """Return the exact values and errors of the numbers of `report`.
 
-        front_speed_over_bound: over 2 c/(gamma - 1) of the gas at the centre at t = 0, the most
-        that any gas can reach from rest.
+        front_speed_over_bound: front_speed over 2 c/(gamma - 1), with c at the centre at t = 0,
+        which is the largest speed that expansion from rest can reach.
         """
         found = self.report(eos, time, particles, pressure)
         radius, speed = self._radius(eos, time)

@@ -1,4 +1,4 @@
-"""Gresho's vortex: a steady ring of rotation, held together by the pressure.
+"""Gresho vortex: a steady rotation, in which pressure balances the centrifugal force.
 
 Gresho & Chan (1990), Int. J. Numer. Meth. Fluids 11, 621; for gases Liska & Wendroff (2003), SIAM
 J. Sci. Comput. 25, 995; scaled to a Mach number Miczek, Roepke & Edelmann (2015), A&A 576, A50.
@@ -7,35 +7,22 @@ J. Sci. Comput. 25, 995; scaled to a Mach number Miczek, Roepke & Edelmann (2015
 from typing import Annotated, ClassVar, Literal
 
 import numpy as np
-from pydantic import AfterValidator, Field
+from pydantic import Field
 
-from sph import lattice as placement
 from sph.problems import base
+from sph.problems.base import wide
+from sph.problems.support import lattice as placement
+from sph.problems.support.vortex import from_centre, rotation
 
 _SHARED = base.Problem.model_fields
 
 DENSITY = 1.0
-PEAK_RADIUS, RADIUS = 0.2, 0.4  # of the fastest gas (speed 1) and of the vortex
+PEAK_RADIUS, RADIUS = 0.2, 0.4  # of the maximum of the speed (1), and of the vortex
 CENTRAL_PRESSURE = 5.0
 
 
-def wide(least: float) -> AfterValidator:
-    """Annotates the domain of a vortex that a narrower periodic box would cut."""
-
-    def check(domain):
-        try:
-            widths = np.diff(np.array(domain, dtype=float))
-        except ValueError:  # rows of different lengths: the configuration says so of every problem
-            return domain
-        if np.any(widths < least):
-            raise ValueError(f"{domain} is narrower than the vortex: expected at least {least:g}")
-        return domain
-
-    return AfterValidator(check)
-
-
 class Problem(base.Problem):
-    """A steady vortex in the middle of a periodic square, at rest or carried along."""
+    """A steady vortex with kinks in its velocity, at rest or in uniform motion."""
 
     defaults: ClassVar = {
         "physics.gamma": 1.4,
@@ -46,10 +33,10 @@ class Problem(base.Problem):
     ideal_gas: ClassVar = True
     limits: ClassVar = {
         "energy_drift": base.Limit(
-            1e-4, "kinetic energy, at most 1 % of the whole, turns into heat, which is conserved"
+            1e-4, "kinetic energy is at most 1 % of the total, and its dissipation conserves energy"
         ),
         "error_v_phi": base.Limit(
-            0.031, "0.0263 with the shipped settings, which hundreds of neighbours make quiet"
+            0.031, "measured: 0.0263 with the shipped settings, which use hundreds of neighbours"
         ),
     }
 
@@ -59,21 +46,22 @@ class Problem(base.Problem):
     domain: Annotated[list[float] | list[list[float]], _SHARED["domain"], wide(2 * RADIUS)] = Field(
         default=[-0.5, 0.5]
     )
-    boundary: Literal["periodic"] = Field(default="periodic", description="of both axes")
+    boundary: Literal["periodic"] = Field(default="periodic", description="boundary of both axes")
     velocity: list[float] = Field(
         default=[0.0, 0.0],
         min_length=2,
         max_length=2,
-        description="bulk motion [vx, vy], which carries the vortex along",
+        description="uniform velocity [vx, vy] of the vortex",
     )
     mach: float | None = Field(
         default=None,
         gt=0.0,
-        description="Mach number of the fastest gas, by which the pressure is shifted; without it "
-        "the pressure in the middle is 5, as published (Mach 0.36 at gamma 1.4)",
+        description="largest Mach number, set by adding a constant pressure; if not given, the "
+        "pressure at the centre is 5, as published (Mach 0.36 at gamma = 1.4)",
     )
     lattice: Literal["cubic", "hexagonal", "relaxed"] = Field(
-        default="cubic", description='"cubic", "hexagonal" or "relaxed", a glass'
+        default="cubic",
+        description='initial lattice: "cubic", "hexagonal", or "relaxed", a disordered glass',
     )
 
     def initial(self, eos) -> base.InitialState:
@@ -84,7 +72,7 @@ class Problem(base.Problem):
         return base.InitialState(position, state["velocity"], mass, state["internal_energy"])
 
     def exact(self, eos, time: float, position: np.ndarray) -> dict[str, np.ndarray]:
-        """The initial vortex, carried along by the bulk motion, at any (D, N) positions."""
+        """Return the initial vortex, moved with the uniform velocity, at (D, N) positions."""
         offset, radius = from_centre(self.box, position, self.velocity, time)
         speed, pressure = profile(radius)
         pressure += self._central_pressure(eos)
@@ -98,10 +86,10 @@ class Problem(base.Problem):
         }
 
     def compare(self, eos, time: float, particles, pressure) -> dict[str, float]:
-        """How well the rotation was kept, all volume-weighted and over the whole box.
+        """Return volume-weighted numbers on the rotation in the whole box.
 
-        error_v_phi: mean |v_phi - exact|; peak_v_phi: the largest mean v_phi of rings one spacing
-        wide, and peak_v_phi_exact the same of the exact velocities at the same particles.
+        error_v_phi: mean |v_phi - exact|; peak_v_phi: largest mean v_phi of rings one spacing wide;
+        peak_v_phi_exact: this value computed from exact velocities at the particles.
         """
         offset, radius = from_centre(self.box, particles.position, self.velocity, time)
         moving = particles.velocity - np.array(self.velocity)[:, None]
@@ -130,24 +118,10 @@ class Problem(base.Problem):
         return DENSITY / (eos.gamma * self.mach**2) - float(rise[0])
 
 
-def from_centre(box, position, velocity, time: float) -> tuple[np.ndarray, np.ndarray]:
-    """Offset (D, N) from the centre of a periodic box, carried along, and its length (N,)."""
-    length = (box[:, 1] - box[:, 0])[:, None]
-    centre = box.mean(axis=1)[:, None] + np.array(velocity)[:, None] * time
-    offset = position - centre
-    offset -= length * np.round(offset / length)
-    return offset, np.hypot(*offset)
-
-
-def rotation(offset: np.ndarray, rate) -> np.ndarray:
-    """Velocity (2, N) of a rotation at `rate` (N,), anticlockwise, at `offset` (2, N)."""
-    return rate * np.stack([-offset[1], offset[0]])
-
-
 def profile(radius: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Speed of the rotation and pressure above that of the centre, at `radius` (N,).
+    """Return rotation speed and pressure relative to the centre, both (N,), at `radius` (N,).
 
-    dP/dr = rho v^2 / r: the pressure balances the centrifugal force.
+    The pressure balances the centrifugal force: dP/dr = rho v^2 / r.
     """
     r = np.clip(radius, PEAK_RADIUS, RADIUS)
     outside = 12.5 * r**2 - 20.0 * r + 4.0 + 4.0 * np.log(r / PEAK_RADIUS)

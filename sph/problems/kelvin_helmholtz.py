@@ -1,6 +1,6 @@
 """Kelvin-Helmholtz instability of a sharp contact: a dense slab that moves through thin gas.
 
-Price (2008), J. Comput. Phys. 227, 10040: the seed's fourth test.
+Price (2008), J. Comput. Phys. 227, 10040.
 """
 
 from typing import Annotated, ClassVar, Literal
@@ -8,9 +8,10 @@ from typing import Annotated, ClassVar, Literal
 import numpy as np
 from pydantic import Field
 
-from sph.lattice import grid, unit_cell
 from sph.problems import base
-from sph.problems.kelvin_helmholtz_smooth import mode_amplitude, only
+from sph.problems.base import only
+from sph.problems.support.lattice import grid, unit_cell
+from sph.problems.support.shear_mode import mode_amplitude
 
 _SHARED = base.Problem.model_fields
 
@@ -19,13 +20,13 @@ SPEED = (-0.5, 0.5)  # along x
 PRESSURE = 2.5
 FACE = 0.25  # |y| of both faces of the slab
 WAVELENGTH = 1.0 / 6.0
-PERTURBATION = 0.025  # amplitude of the velocity along y, and half width of the bands that have it
+PERTURBATION = 0.025  # amplitude of the velocity along y, and half width of the perturbed bands
 # Growth time of the linear mode, lambda (rho1 + rho2) / (sqrt(rho1 rho2) |v1 - v2|)
 TAU = WAVELENGTH * sum(DENSITY) / (np.prod(DENSITY) ** 0.5 * abs(SPEED[1] - SPEED[0]))
 
 
 class Problem(base.Problem):
-    """A dense slab that moves through gas half as dense, seeded with one wavelength."""
+    """A dense slab moving through gas of half its density, perturbed at one wavelength."""
 
     defaults: ClassVar = {
         "physics.gamma": 5.0 / 3.0,
@@ -35,7 +36,7 @@ class Problem(base.Problem):
     }
     limits: ClassVar = {
         "energy_drift": base.Limit(
-            1e-3, "subsonic and in pressure balance: far less work is done than in a shock tube"
+            1e-3, "subsonic flow in pressure equilibrium, with less work than in a shock tube"
         )
     }
 
@@ -45,18 +46,19 @@ class Problem(base.Problem):
     domain: Annotated[list[float] | list[list[float]], _SHARED["domain"], only([-0.5, 0.5])] = (
         Field(default=[-0.5, 0.5])
     )
-    boundary: Literal["periodic"] = Field(default="periodic", description="of both axes")
+    boundary: Literal["periodic"] = Field(default="periodic", description="boundary of both axes")
     lattice: Literal["cubic", "hexagonal"] = Field(
         default="hexagonal",
-        description='"cubic" or "hexagonal", slab and outside with own spacings',
+        description='initial lattice, "cubic" or "hexagonal", with separate spacings in the slab '
+        "and outside",
     )
 
     def initial(self, eos) -> base.InitialState:
-        """Particles of one mass, on a lattice in the slab and on another outside."""
+        """Return particles of equal mass, on separate lattices in the slab and outside."""
         outside_cells, slab_cells = _layer_cells(self.lattice, self.n)
         slab = grid(np.array([[-0.5, 0.5], [-FACE, FACE]]), self.lattice, slab_cells)
         outside = grid(np.array([[-0.5, 0.5], [FACE, 1.0 - FACE]]), self.lattice, outside_cells)
-        outside[1] -= outside[1] >= 0.5  # its upper half belongs below the slab
+        outside[1] -= outside[1] >= 0.5  # periodic: the upper half is below the slab
         position = np.hstack([outside, slab])
         is_slab = np.abs(position[1]) < FACE
         n = position.shape[1]
@@ -67,28 +69,28 @@ class Problem(base.Problem):
         return base.InitialState(position, velocity, mass, energy)
 
     def diagnostics(self, particles) -> dict[str, float]:
-        """The mode's amplitude in the velocity away from the slab, opposite at its two faces."""
+        """Return mode_amplitude, of the velocity away from the slab."""
         x, y = particles.position
         outward = np.sign(y) * particles.velocity[1]
         return {"mode_amplitude": mode_amplitude(particles, x, y, outward, WAVELENGTH)}
 
     def report(self, eos, time: float, particles, pressure) -> dict[str, float]:
-        return self.diagnostics(particles) | {"growth_time": TAU}
+        return self.diagnostics(particles) | {"growth_time": float(TAU)}
 
 
 def _perturbation(x: np.ndarray, y: np.ndarray) -> np.ndarray:
-    """Velocity along y in a band around each face, opposite at the two."""
+    """Return the velocity along y: a sine in a band around each face, of opposite signs."""
     wave = PERTURBATION * np.sin(2.0 * np.pi * (x + 0.5) / WAVELENGTH)
     in_band = np.abs(np.abs(y) - FACE) < PERTURBATION
     return np.where(in_band, -np.sign(y) * wave, 0.0)
 
 
 def _layer_cells(kind: str, n: int) -> tuple[tuple[int, int], tuple[int, int]]:
-    """Cells (along x, along y) outside and in the slab, both regions being 1 by 1/2.
+    """Return the numbers of cells (along x, along y) outside and in the slab, both 1 by 1/2.
 
-    The slab gets exactly twice as many, so that all masses are equal. Of the whole numbers that
-    allow it, those are taken with cells nearest to their true shape and in all nearest to n.
-    Rows outside are even in number: no particle lies on y = 1/2.
+    The slab has exactly twice as many cells, so that all masses are equal. Among the possible
+    numbers, those with the least distorted cells and the total nearest to n are chosen. The number
+    of rows outside is even, so that no particle lies on y = 1/2.
     """
     cell = unit_cell(kind, 2)
     region = np.array([1.0, 0.5]) / np.array(cell.sides)
@@ -110,6 +112,6 @@ def _layer_cells(kind: str, n: int) -> tuple[tuple[int, int], tuple[int, int]]:
 
 
 def _near(ideal: float) -> np.ndarray:
-    """Whole numbers within 2 % and 8 of `ideal`: some pair of them has a large common divisor."""
+    """Return whole numbers within 2 % + 8 of `ideal`, some of which have large common divisors."""
     reach = 8 + int(0.02 * ideal)
     return np.arange(max(1, int(ideal) - reach), int(ideal) + reach + 1)

@@ -1,46 +1,37 @@
-"""Kelvin-Helmholtz instability of a smooth shear layer, whose exact solution has no sharp contact.
+"""Kelvin-Helmholtz instability of a smooth shear layer.
 
 McNally, Lyra & Passy (2012), ApJS 201, 18: section 2 for the initial state, section 4 for the
-mode's amplitude. Its growth is held against linear theory, for the same initial state and
-measured in the same way: that velocity is no eigenmode, and its amplitude first falls.
+amplitude of the mode. Its growth is compared with linear theory for this initial state, measured by
+this amplitude. The initial velocity is not an eigenmode, so the amplitude first falls.
 """
 
 from typing import Annotated, ClassVar, Literal
 
 import numpy as np
-from pydantic import AfterValidator, Field
+from pydantic import Field
 
 from sph.exact import kelvin_helmholtz as linear
-from sph.lattice import fill
 from sph.problems import base
+from sph.problems.base import only
+from sph.problems.support.lattice import fill
+from sph.problems.support.shear_mode import mode_amplitude, surface_weight
 
 _SHARED = base.Problem.model_fields
 
 DENSITY = (1.0, 2.0)  # outside, inside
 SPEED = (0.5, -0.5)  # along x
-RAMP = 0.025  # the length over which one becomes the other
+RAMP = 0.025  # length of the transition between both
 PRESSURE = 2.5
 WAVELENGTH = 0.5
 PERTURBATION = 0.01  # amplitude of the velocity along y
-# Times between which growth is measured: what decays is gone by then, and gas has moved less than
-# the ramp is wide.
+# Interval of time in which growth is measured: decaying modes have vanished, and displacements are
+# still below the width of the ramp.
 GROWTH = (0.5, 1.0)
-POINTS = 128  # of linear theory across the layers: its growth rate is known to 0.1 %
-
-
-def only(domain: list[float]) -> AfterValidator:
-    """Annotates the domain of a problem that is set up for no other."""
-
-    def check(given):
-        if given not in (domain, [domain, domain]):
-            raise ValueError(f"this problem is set up for {domain} along both axes only")
-        return given
-
-    return AfterValidator(check)
+POINTS = 128  # of linear theory along y; its growth rate is then accurate to 0.1 %
 
 
 class Problem(base.Problem):
-    """Two streams of densities 1 and 2 with smooth ramps between them."""
+    """Two streams of densities 1 and 2 with a smooth transition: growth rate against theory."""
 
     defaults: ClassVar = {
         "physics.gamma": 5.0 / 3.0,
@@ -50,10 +41,10 @@ class Problem(base.Problem):
     }
     limits: ClassVar = {
         "energy_drift": base.Limit(
-            1e-3, "a smooth flow, whose energy the scheme conserves to the order of the time step"
+            1e-3, "a smooth flow, with the energy error of the time step only"
         ),
         "growth_ratio": base.Limit(
-            0.6, "0.71 with 64 x 64 particles and the default kernel and eta", at_least=True
+            0.6, "measured: 0.71 with 64 x 64 particles, default kernel and eta", at_least=True
         ),
     }
     swamped: ClassVar = {
@@ -66,10 +57,10 @@ class Problem(base.Problem):
     domain: Annotated[list[float] | list[list[float]], _SHARED["domain"], only([0.0, 1.0])] = Field(
         default=[0.0, 1.0]
     )
-    boundary: Literal["periodic"] = Field(default="periodic", description="of both axes")
+    boundary: Literal["periodic"] = Field(default="periodic", description="boundary of both axes")
 
     def initial(self, eos) -> base.InitialState:
-        """A cubic lattice with masses by the density."""
+        """Return a cubic lattice whose masses follow the density."""
         position = fill(self.box, self.n, "cubic")
         x, y = position
         density = _ramped(*DENSITY, y)
@@ -88,7 +79,7 @@ class Problem(base.Problem):
         return self.diagnostics(particles)
 
     def theory(self, eos, times: np.ndarray) -> dict[str, np.ndarray]:
-        """The mode's amplitude by linear theory."""
+        """Return mode_amplitude (M,) from linear theory."""
         y = linear.points(1.0, POINTS)
         density, wavenumber = _ramped(*DENSITY, y), 2.0 * np.pi / WAVELENGTH
         stiffness = density * eos.sound_speed(density, np.full(POINTS, PRESSURE)) ** 2
@@ -96,14 +87,14 @@ class Problem(base.Problem):
         start = np.zeros((3, POINTS), dtype=complex)
         start[1] = -1j * PERTURBATION  # sin(kx) is the real part of -i e^(ikx)
         upward = linear.evolution(layer, wavenumber, start, times)[:, 1]
-        weight = _surface_weight(y - 0.5, wavenumber)
+        weight = surface_weight(y - 0.5, wavenumber)
         return {"mode_amplitude": np.abs(upward @ weight) / weight.sum()}
 
     def over_time(self, eos, history: dict[str, np.ndarray]) -> dict[str, float]:
-        """Rate at which the mode's amplitude grows from t = 0.5 to 1, by least squares.
+        """Return growth rates of the mode from t = 0.5 to 1, by least squares.
 
-        growth_rate: measured; linear_growth_rate: what linear theory has at the same times;
-        growth_ratio: the first over the second. Nothing where the history does not span them.
+        growth_rate: measured; linear_growth_rate: of linear theory at these times; growth_ratio:
+        growth_rate over linear_growth_rate. Empty if the history does not cover these times.
         """
         t = history["t"]
         inside = (t >= GROWTH[0]) & (t <= GROWTH[1])
@@ -119,30 +110,13 @@ class Problem(base.Problem):
         }
 
 
-def mode_amplitude(particles, x, height, velocity, wavelength: float) -> float:
-    """Amplitude of the mode of that wavelength along x in `velocity` (N,) (eqs 10-13).
-
-    `height` (N,) is y above the middle of the slab, whose faces are at heights of +-1/4. Particles
-    weigh by their volume and by their distance from the nearer face, as a surface mode decays.
-    """
-    wavenumber = 2.0 * np.pi / wavelength
-    weight = particles.mass / particles.density * _surface_weight(height, wavenumber)
-    sine = (weight * velocity * np.sin(wavenumber * x)).sum()
-    cosine = (weight * velocity * np.cos(wavenumber * x)).sum()
-    return float(2.0 * np.hypot(sine, cosine) / weight.sum())
-
-
-def _surface_weight(height: np.ndarray, wavenumber: float) -> np.ndarray:
-    return np.exp(-wavenumber * np.abs(np.abs(height) - 0.25))
-
-
 def _growth(t: np.ndarray, amplitude: np.ndarray) -> float:
-    """Slope of the amplitude's logarithm over time, by least squares."""
+    """Return the slope of ln(amplitude) over time, by least squares."""
     return float(np.polyfit(t, np.log(amplitude), 1)[0])
 
 
 def _ramped(outside: float, inside: float, y: np.ndarray) -> np.ndarray:
-    """From `outside` to `inside` across y = 1/4 and back across 3/4."""
+    """Return a smooth change from `outside` to `inside` across y = 1/4 and back across 3/4."""
     depth = 0.25 - np.abs(y - 0.5)  # into the slab
     share = 0.5 * np.exp(-np.abs(depth) / RAMP)  # of the other stream
     return np.where(

@@ -1,8 +1,8 @@
-"""A cold ring of gas around a point mass: on circular orbits nothing happens but shear.
+"""A cold ring of gas around a point mass, on circular orbits: a steady shear flow.
 
 Cartwright, Stamatellos & Whitworth (2009), MNRAS 395, 2373; Hosono, Saitoh & Makino (2016), ApJS
-224, 32. Particles that shear past one another are disturbed by the errors of their pressure forces
-and by viscosity, which takes shear for compression; after some orbits the ring breaks up.
+224, 32. Errors of the pressure forces, and artificial viscosity that acts in pure shear, disturb
+the orbits. After some orbits the ring breaks up.
 """
 
 from typing import Annotated, ClassVar, Literal
@@ -10,22 +10,23 @@ from typing import Annotated, ClassVar, Literal
 import numpy as np
 from pydantic import Field, model_validator
 
-from sph.external.point_mass import PointMass
+from sph import registry
+from sph.parts.external.point_mass import PointMass
 from sph.problems import base
 
 _SHARED = base.Problem.model_fields
 
 DENSITY = 1.0
-# Where the ring counts as broken: rms of density over exact, minus 1, and rms of the distance of
-# particles from their orbits over the width of the ring. Both are of its inner part, of which the
-# ends that nothing holds, EDGE of the width on either side, are left out.
+# The ring counts as broken above these bounds: rms of density/exact - 1, and rms of the distance of
+# particles from their initial orbits over the width of the ring. Both exclude the edges, EDGE of
+# the width on either side, which expand into vacuum.
 DENSITY_BOUND, RADIUS_BOUND = 0.1, 0.02
 EDGE = 0.15
 ORBITED = PointMass(mass=1.0, softening=0.0)
 
 
 class Problem(base.Problem):
-    """A cold ring in circular orbits about a point mass of 1: how many orbits it stays whole."""
+    """A cold ring on circular orbits about a point mass: how many orbits it stays intact."""
 
     defaults: ClassVar = {
         "physics.gamma": 5.0 / 3.0,
@@ -35,7 +36,9 @@ class Problem(base.Problem):
         "output.interval": 6.283185307179586,
     }
     limits: ClassVar = {
-        "energy_drift": base.Limit(1e-3, "circular orbits: kinetic and potential energy stay"),
+        "energy_drift": base.Limit(
+            1e-3, "circular orbits, on which kinetic and potential energy are constant"
+        ),
     }
 
     name: Literal["keplerian_ring"] = "keplerian_ring"
@@ -44,7 +47,9 @@ class Problem(base.Problem):
     domain: Annotated[list[float] | list[list[float]], _SHARED["domain"]] = Field(
         default=[-2.0, 2.0]
     )
-    boundary: Literal["open"] = Field(default="open", description="of both axes")
+    boundary: Literal["open"] = Field(
+        default="open", description="boundary of both axes; vacuum outside"
+    )
     inner: float = Field(default=0.5, gt=0.0, description="inner radius of the ring")
     outer: float = Field(default=1.5, gt=0.0, description="outer radius of the ring")
     pressure: float = Field(default=1e-6, gt=0.0, description="pressure of the cold gas at t = 0")
@@ -61,18 +66,18 @@ class Problem(base.Problem):
 
     @property
     def period(self) -> float:
-        """Of the orbit in the middle of the ring."""
+        """Period of the orbit in the middle of the ring."""
         return 2.0 * np.pi * (0.5 * (self.inner + self.outer)) ** 1.5
 
     def initial(self, eos) -> base.InitialState:
-        """Circles of evenly spaced particles, each circle turned against the one inside it."""
+        """Return circles of evenly spaced particles, each rotated relative to the next."""
         radius, angle, mass = self._circles()
         position = radius * np.array([np.cos(angle), np.sin(angle)])
         state = self.exact(eos, 0.0, position)
         return base.InitialState(position, state["velocity"], mass, state["internal_energy"])
 
     def exact(self, eos, time: float, position: np.ndarray) -> dict[str, np.ndarray]:
-        """The ring for ever, at (2, N) positions, which are taken to be in it."""
+        """Return the steady ring at (2, N) positions, which are assumed to be inside it."""
         radius = np.sqrt((position**2).sum(axis=0))
         x, y = position
         density, pressure = np.full(radius.size, DENSITY), np.full(radius.size, self.pressure)
@@ -84,26 +89,26 @@ class Problem(base.Problem):
         }
 
     def departs(self, physics) -> str | None:
-        if physics.external_model() != ORBITED:
+        if registry.model("sph.parts.external", physics.external) != ORBITED:
             return (
-                "the exact orbits are those about a point mass of 1 without softening, and "
+                "the exact solution is for a point mass of 1 without softening, but "
                 "physics.external is another field"
             )
-        return base.other_physics(physics, "heating")
+        return base.other_physics(physics, besides="external")
 
     def exact_ends(self, eos) -> tuple[float, str]:
-        """When sound has come from the edges, which expand, to the gas that errors are taken of."""
+        """Return when sound waves from the expanding edges reach the region of the errors."""
         sound = float(eos.sound_speed(DENSITY, self.pressure))
         return EDGE * self.width / sound, "waves from the ring's edges reach its inner part"
 
     def error_region(self, eos, time: float, position: np.ndarray) -> tuple[np.ndarray, str]:
-        """The ring but for its edges."""
+        """Return the ring without its edges."""
         low, high = self._kept
         radius = np.sqrt((position**2).sum(axis=0))
         return (low < radius) & (radius < high), f"{low:.4g} < r < {high:.4g}"
 
     def diagnostics(self, particles) -> dict[str, float]:
-        """How far particles that began away from the edges are from the ring as it began.
+        """Return deviations from the initial ring, over particles not initially at its edges.
 
         density_deviation: rms of rho/rho_0 - 1; radial_deviation: rms of r - r_0 over the width.
         """
@@ -117,9 +122,10 @@ class Problem(base.Problem):
         }
 
     def over_time(self, eos, history: dict[str, np.ndarray]) -> dict[str, float]:
-        """orbits_intact: orbits at its middle before the ring deviates by more than the bounds.
+        """Return orbits and orbits_intact, times in periods of the middle of the ring.
 
-        The last time of the history where it never does.
+        orbits: duration of the run; orbits_intact: first time at which a deviation exceeds its
+        bound, or the duration of the run if none does.
         """
         broken = (history["density_deviation"] > DENSITY_BOUND) | (
             history["radial_deviation"] > RADIUS_BOUND
@@ -135,7 +141,7 @@ class Problem(base.Problem):
         return self.inner + EDGE * self.width, self.outer - EDGE * self.width
 
     def _circles(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Radius, angle and mass (N,) of the particles, by ID: near squares of one area."""
+        """Return radius, angle and mass (N,) of the particles by ID, in cells close to squares."""
         area = np.pi * (self.outer**2 - self.inner**2)
         number = max(1, round(self.width / np.sqrt(area / self.n)))
         edges = np.linspace(self.inner, self.outer, number + 1)
@@ -143,7 +149,7 @@ class Problem(base.Problem):
         counts = np.maximum(1, np.round(rings * self.n / area)).astype(int)
         ring = np.repeat(np.arange(number), counts)
         within = np.arange(ring.size) - np.repeat(np.cumsum(counts) - counts, counts)
-        # turns of the golden ratio never line up
+        # rotation by the golden ratio avoids aligned particles in neighbouring circles
         angle = 2.0 * np.pi * (within / counts[ring] + 0.6180339887498949 * ring)
         radius = 0.5 * (edges[1:] + edges[:-1])
         return radius[ring], angle, DENSITY * (rings / counts)[ring]

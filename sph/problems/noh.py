@@ -1,7 +1,7 @@
-"""Noh's implosion: cold gas that falls from everywhere at one speed onto a plane, line or point.
+"""Noh implosion: cold gas that falls at uniform speed onto a plane, line or point.
 
-Noh (1987), J. Comput. Phys. 72, 78. The gas behind the shock is too hot and too thin about the
-centre in every method whose artificial viscosity smears the shock ("wall heating", his subject).
+Noh (1987), J. Comput. Phys. 72, 78. In methods whose artificial viscosity smears the shock, the gas
+near the centre is too hot and too thin ("wall heating").
 """
 
 from typing import Annotated, ClassVar, Literal
@@ -9,27 +9,25 @@ from typing import Annotated, ClassVar, Literal
 import numpy as np
 from pydantic import Field, model_validator
 
-from sph import lattice as placement
 from sph.exact import noh
 from sph.problems import base
+from sph.problems.support import lattice as placement
 
 _SHARED = base.Problem.model_fields
 
 DENSITY = SPEED = 1.0
-# Volume of a cube of side 2 over that of the ball in it
-CUBE_OVER_BALL = (1.0, 4.0 / np.pi, 6.0 / np.pi)
-# The gas ends at radius R - t, where the density sum lacks neighbours: errors are taken up to 7/8
-# of that. It is .35 at t = 0.6, as in the comparisons of codes.
+# The gas ends at radius R - t, where the density sum lacks neighbours. Errors are averaged up to
+# 7/8 of that radius: 0.35 at t = 0.6, as in published comparisons.
 KEPT = 0.875
-# Range of the figures by which codes are compared in 1-D (Spheral's own test)
+# Range of x of the error norms in 1-D, as in the test of the code Spheral
 PLANAR_RANGE = (0.05, 0.35)
-# Largest pressure ahead of the shock over that behind it at which the gas counts as cold. A shock
-# compresses gas of finite pressure less, by 4 gamma/(gamma^2 - 1) of that ratio: 0.4 % at 5/3.
+# Largest ratio of the pressures ahead of and behind the shock at which the gas counts as cold.
+# The compression is reduced by 4 gamma/(gamma^2 - 1) times that ratio: 0.4 % at gamma = 5/3.
 COLD = 1e-3
 
 
 class Problem(base.Problem):
-    """Cold gas that falls onto the origin at speed 1 and is stopped by a shock that runs out."""
+    """Cold gas that falls onto the origin at speed 1 and is stopped by an outgoing shock."""
 
     defaults: ClassVar = {
         "physics.gamma": 5.0 / 3.0,
@@ -41,12 +39,12 @@ class Problem(base.Problem):
     ideal_gas: ClassVar = True
     radial: ClassVar = True
     limits: ClassVar = {
-        "energy_drift": base.Limit(2e-3, "all kinetic energy turns into heat at a strong shock"),
+        "energy_drift": base.Limit(2e-3, "a strong shock converts all kinetic energy to heat"),
         "planar_norm_density": base.Limit(
-            0.018, "an independent transcription of the equations gives .0169 with 100 particles"
+            0.018, "an independent implementation gives 0.0169 with 100 particles"
         ),
-        "planar_norm_pressure": base.Limit(0.006, "the same transcription gives .0052"),
-        "planar_norm_velocity": base.Limit(0.008, "the same transcription gives .0070"),
+        "planar_norm_pressure": base.Limit(0.006, "an independent implementation gives 0.0052"),
+        "planar_norm_velocity": base.Limit(0.008, "an independent implementation gives 0.0070"),
     }
 
     name: Literal["noh"] = "noh"
@@ -54,17 +52,19 @@ class Problem(base.Problem):
     n: Annotated[int, _SHARED["n"]] = 100
     domain: list[float] | list[list[float]] = Field(
         default=[0.0, 1.0],
-        description="[-R, R] for every axis, or [0, R] before mirrors (half of the line, a quarter "
-        "of the disc, an eighth of the ball); the gas fills what is within R of the origin",
+        description="ends of the box, equal for all axes: [-R, R], or [0, R] with mirrors (half of "
+        "a line, a quarter of a disc or an eighth of a ball); gas fills the radius R",
     )
     boundary: Literal["mirror", "open"] = Field(
         default="mirror",
-        description='"open", or "mirror" where the domain begins at 0, of all axes; the gas leaves '
-        "the ends at R, which have no effect",
+        description='boundary of all axes: "mirror" for a domain that begins at 0, otherwise '
+        '"open"; the ends at R have no effect, because the gas moves away from them',
     )
     pressure: float = Field(default=1e-6, gt=0.0, description="pressure of the cold gas at t = 0")
     lattice: Literal["cubic", "hexagonal", "bcc", "relaxed"] = Field(
-        default="cubic", description='"cubic", "hexagonal" (2-D), "bcc" (3-D) or "relaxed", a glass'
+        default="cubic",
+        description='initial lattice: "cubic", "hexagonal" (2-D), "bcc" (3-D), or "relaxed", a '
+        "disordered glass",
     )
 
     @model_validator(mode="after")
@@ -72,7 +72,7 @@ class Problem(base.Problem):
         placement.checked(self.lattice, self.dimension)
         try:
             ends = self.box
-        except ValueError:  # rows of different lengths: the configuration says so of every problem
+        except ValueError:  # rows of different lengths are reported by the configuration
             return self
         if ends.shape != (self.dimension, 2):
             return self
@@ -80,14 +80,14 @@ class Problem(base.Problem):
         if not (self.radius > 0.0 and np.all(ends == (begin, self.radius))):
             expected = "[0, R]" if self.boundary == "mirror" else "[-R, R]"
             raise ValueError(
-                f'domain = {self.domain}: expected {expected} with boundary "{self.boundary}", and '
-                "one R for all axes"
+                f'domain = {self.domain}: expected {expected} with boundary "{self.boundary}", '
+                "equal for all axes"
             )
         return self
 
     @property
     def centre(self) -> np.ndarray:
-        """(D,) the origin, which is a corner of the box where there are mirrors."""
+        """(D,) the origin, which is a corner of the box with mirrors."""
         return np.zeros(self.dimension)
 
     @property
@@ -96,13 +96,13 @@ class Problem(base.Problem):
         return float(self.box[0, 1])
 
     def fills_box(self, eos) -> bool:
-        """A disc or ball does not fill the corners, and the gas leaves the ends at R."""
+        """Return False: the corners of the box are empty, and the gas moves away from R."""
         return False
 
     def initial(self, eos) -> base.InitialState:
-        """What lies within R of the origin of a lattice of particles of one mass."""
-        in_box = self.n * CUBE_OVER_BALL[self.dimension - 1]
-        even = self.boundary == "open"  # no particle at the origin, which would fall nowhere
+        """Return particles of equal mass on the sites of a lattice within R of the origin."""
+        in_box = self.n * placement.CUBE_OVER_BALL[self.dimension - 1]
+        even = self.boundary == "open"  # no particle at the origin, where no direction is defined
         position = placement.fill(self.box, max(1, round(in_box)), self.lattice, even=even)
         volume = np.prod(self.box[:, 1] - self.box[:, 0]) / position.shape[1]
         within = (position**2).sum(axis=0) < self.radius**2
@@ -113,7 +113,7 @@ class Problem(base.Problem):
         return base.InitialState(position, state["velocity"], mass, state["internal_energy"])
 
     def exact(self, eos, time: float, position: np.ndarray) -> dict[str, np.ndarray]:
-        """The implosion of gas without an end, at (D, N) positions."""
+        """Return the implosion of unbounded gas at (D, N) positions."""
         radius = _length(position)
         density, speed, pressure = noh.solve(
             radius, time, eos.gamma, self.dimension, DENSITY, SPEED, self.pressure
@@ -132,8 +132,8 @@ class Problem(base.Problem):
         ratio = self.pressure * compression**gamma / hot
         if ratio > COLD:
             return (
-                "the exact solution is that of cold gas, and problem.pressure makes the pressure "
-                f"ahead of the shock {ratio:.2g} of that behind it, above {COLD:g}"
+                "the exact solution is for cold gas, but with problem.pressure the pressure ahead "
+                f"of the shock is {ratio:.2g} of that behind the shock, above {COLD:g}"
             )
         return super().departs(physics)
 
@@ -142,20 +142,20 @@ class Problem(base.Problem):
         return self.radius / (SPEED + shock_speed), "the shock reaches the outer end of the gas"
 
     def error_region(self, eos, time: float, position: np.ndarray) -> tuple[np.ndarray, str]:
-        """The gas but for its outer end, as long as it has one in front of the shock."""
+        """Return the gas without its outer end, as long as there is gas ahead of the shock."""
         if time > self.exact_ends(eos)[0]:
             return super().error_region(eos, time, position)
         reach = KEPT * (self.radius - SPEED * time)
         return _length(position) < reach, f"r < {reach:.4g}"
 
     def compare(self, eos, time: float, particles, pressure) -> dict[str, float]:
-        """Plateau, shock and, in 1-D, the norms in which other codes give their error.
+        """Return errors of plateau and shock and, in 1-D, error norms as other codes give them.
 
         plateau_density_error, plateau_pressure_error: medians between 0.3 and 0.8 of the shock's
-        radius, over exact, minus 1. shock_radius: the density falls there half way to that of the
-        gas in front. central_density_error: of the particle nearest the origin, over exact, minus 1
-        (wall heating).
-        planar_norm_*: sum dx |error| over .05 < x < .35, dx = m/rho.
+        radius, over exact, minus 1. shock_radius: where the density has fallen half way to that
+        ahead of the shock. central_density_error: of the particle nearest the origin, over exact,
+        minus 1 (wall heating).
+        planar_norm_*: sum dx |error| over 0.05 < x < 0.35, with dx = m/rho.
         """
         if time == 0.0:
             return {}
@@ -180,7 +180,7 @@ class Problem(base.Problem):
         return figures
 
     def _found_shock(self, eos, radius: np.ndarray, density: np.ndarray) -> float:
-        """Radius beyond which no particle is denser than half way down from the plateau."""
+        """Return the largest radius of a particle denser than the middle of the shock's jump."""
         behind, _ = noh.plateau(eos.gamma, self.dimension, DENSITY, SPEED)
         jump = (eos.gamma + 1.0) / (eos.gamma - 1.0)
         half_way = 0.5 * (behind + behind / jump)

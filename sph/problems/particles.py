@@ -1,4 +1,4 @@
-"""A handful of particles given one by one: hard geometry, of which only bounds are known."""
+"""Individual particles given in the configuration, for extreme geometries."""
 
 from typing import Annotated, Any, ClassVar, Literal
 
@@ -22,14 +22,14 @@ class Problem(base.Problem):
         "output.interval": 0.5,
     }
     limits: ClassVar = {
-        "energy_drift": base.Limit(1e-3, "what a leapfrog may lose on any gas"),
-        "momentum_change": base.Limit(1e-12, "pairs push one another equally: round-off"),
+        "energy_drift": base.Limit(1e-3, "error of the leapfrog in any flow"),
+        "momentum_change": base.Limit(1e-12, "pair forces are equal and opposite: only round-off"),
     }
 
     name: Literal["particles"] = "particles"
     dimension: Annotated[int, _SHARED["dimension"]] = 1
     n: int = Field(
-        default=4, ge=1, description="number of positions, from which it follows if not given"
+        default=4, ge=1, description="number of particles; the length of positions if not given"
     )
     domain: Annotated[list[float] | list[list[float]], _SHARED["domain"]] = Field(
         default=[-1.0, 1.0]
@@ -38,17 +38,19 @@ class Problem(base.Problem):
     positions: list[list[float]] = Field(
         default=[[-0.3], [-0.1], [0.1], [0.3]],
         min_length=1,
-        description="one list of coordinates a particle",
+        description="one list of coordinates per particle",
     )
     velocities: list[list[float]] | None = Field(
-        default=None, description="one list of components a particle; at rest if not given"
+        default=None,
+        description="one list of velocity components per particle; at rest if not given",
     )
     masses: float | list[float] = Field(
-        default=1.0, description="one mass for all, or a list with one a particle"
+        default=1.0, description="one mass for all particles, or a list with one per particle"
     )
     internal_energies: float | list[float] = Field(
         default=1.0,
-        description="internal energy per mass: one for all, or a list with one a particle",
+        description="internal energy per unit mass: one for all particles, or a list with one per "
+        "particle",
     )
 
     @model_validator(mode="before")
@@ -61,24 +63,26 @@ class Problem(base.Problem):
     def _fits(self):
         n = len(self.positions)
         if self.n != n:
-            raise ValueError(f"n = {self.n}: expected the number of positions, {n}, or nothing")
+            raise ValueError(
+                f"n = {self.n}: expected {n}, the number of positions. Try: leave n out"
+            )
         for name in ("positions", "velocities"):
             for row in getattr(self, name) or ():
                 if len(row) != self.dimension:
-                    raise ValueError(f"{name}: {row} has not {self.dimension} components")
+                    raise ValueError(f"{name}: {row}: expected {self.dimension} components")
         for name in PER_PARTICLE:
             given = getattr(self, name)
             if isinstance(given, list) and len(given) != n:
-                raise ValueError(f"{name}: {len(given)} of them, expected {n}")
+                raise ValueError(f"{name}: {len(given)} values; expected {n}")
         for name in ("masses", "internal_energies"):
             if not np.all(np.array(getattr(self, name)) > 0.0):
-                raise ValueError(f"{name}: {getattr(self, name)}: expected above 0")
+                raise ValueError(f"{name}: {getattr(self, name)}: expected values above 0")
         return self
 
     @model_validator(mode="after")
     def _in_the_box(self):
         if len(np.shape(self.domain)) == 2 and len(self.domain) != self.dimension:
-            return self  # which the configuration says of every problem
+            return self  # reported by the configuration
         for axis, boundary in enumerate(self.boundaries[: self.dimension]):
             low, high = self.box[axis]
             for row in self.positions:
@@ -89,11 +93,11 @@ class Problem(base.Problem):
         return self
 
     def fills_box(self, eos) -> bool:
-        """They may be anywhere."""
+        """Return False: positions are arbitrary."""
         return False
 
     def initial(self, eos) -> base.InitialState:
-        """The particles as they were given."""
+        """Return the particles given in the configuration."""
         position = np.array(self.positions, dtype=float).T
         still = self.velocities is None
         velocity = np.zeros_like(position) if still else np.array(self.velocities, dtype=float).T
@@ -106,7 +110,7 @@ class Problem(base.Problem):
         )
 
     def report(self, eos, time: float, particles, pressure) -> dict[str, float]:
-        """Bounds: energies above zero."""
+        """Return the extremes of internal energy, density and support radius."""
         return {
             "lowest_internal_energy": float(particles.internal_energy.min()),
             "lowest_density": float(particles.density.min()),
@@ -114,10 +118,10 @@ class Problem(base.Problem):
         }
 
     def compare(self, eos, time: float, particles, pressure) -> dict[str, float]:
-        """Where all is open, the centre of mass beside its free motion.
+        """Return centre_error if all boundaries are open.
 
-        centre_error: its distance from where it must be, over what the fastest particle travels
-        and the extent of all particles.
+        centre_error: distance of the centre of mass from its free motion, over the extent of the
+        particles plus the distance that the fastest particle travels.
         """
         if set(self.boundaries) != {"open"}:
             return {}

@@ -1,4 +1,4 @@
-"""Point explosion: energy released in the middle of cold gas (Sedov 1946; Taylor 1950)."""
+"""Point explosion: energy released at the centre of cold gas (Sedov 1946; Taylor 1950)."""
 
 import math
 from typing import Annotated, ClassVar, Literal
@@ -6,21 +6,20 @@ from typing import Annotated, ClassVar, Literal
 import numpy as np
 from pydantic import Field, field_validator
 
-from sph import lattice as placement
 from sph.errors import ConfigError
 from sph.exact import sedov
 from sph.problems import base
+from sph.problems.support import lattice as placement
 
 _SHARED = base.Problem.model_fields
 
-# Largest background pressure over that behind the shock at which the background counts as cold.
-# A shock compresses gas of finite pressure less, by 4 gamma/(gamma^2 - 1) of that ratio: 0.4 % at
-# gamma = 5/3.
+# Largest ratio of background pressure to pressure behind the shock at which the gas counts as cold.
+# The compression is reduced by 4 gamma/(gamma^2 - 1) times that ratio: 0.4 % at gamma = 5/3.
 COLD = 1e-3
 
 
 class Problem(base.Problem):
-    """A blast wave from the centre of a box of uniform cold gas."""
+    """A blast wave from a point in uniform, cold gas."""
 
     defaults: ClassVar = {
         "physics.gamma": 5.0 / 3.0,
@@ -32,12 +31,12 @@ class Problem(base.Problem):
     radial: ClassVar = True
     limits: ClassVar = {
         "energy_drift": base.Limit(
-            1e-3, "1.2e-4 with the limit u/|du/dt| on the step, eight times below; 1.3e-3 without"
+            1e-3, "measured: 1.2e-4 with the time step limit u/|du/dt|, 1.3e-3 without"
         ),
         "momentum_radius_error": base.Limit(
             0.03,
-            "2.7 % at 32^3 and alpha = 3, whose shock is a quarter of the radius wide; 0.7 % at "
-            "64^3, or 0.15 % at alpha = 1.5",
+            "measured: 2.7 % at 32^3 and alpha = 3, with a shock a quarter of the radius wide; "
+            "0.7 % at 64^3; 0.15 % at 32^3 and alpha = 1.5",
         ),
     }
 
@@ -54,13 +53,14 @@ class Problem(base.Problem):
     energy_particles: int = Field(
         default=32,
         ge=1,
-        description="particles nearest the centre that share the energy equally; where it is one, "
-        "the lattice is shifted to put it in the very centre",
+        description="number of particles nearest the centre that share the energy equally; if 1, "
+        "the lattice is shifted so that this particle is at the centre",
     )
     lattice: Literal["cubic", "hexagonal", "bcc", "relaxed"] = Field(
         default="cubic",
-        description='"cubic", "hexagonal" (2-D), "bcc" (3-D), or "relaxed": noise relaxed to a '
-        "glass; cells are even in number along each axis, so that the centre is a corner of cells",
+        description='initial lattice: "cubic", "hexagonal" (2-D), "bcc" (3-D), or "relaxed", a '
+        "disordered glass; the number of cells along each axis is even, so that the centre is a "
+        "corner of cells",
     )
 
     @field_validator("lattice")
@@ -73,9 +73,9 @@ class Problem(base.Problem):
         return sedov.HOLLOW if self.dimension == 3 else math.inf
 
     def initial(self, eos) -> base.InitialState:
-        """Particles of one mass at rest, cold but for the hot ones in the middle.
+        """Return particles of equal mass at rest, of which those nearest the centre are hot.
 
-        Raises ConfigError if there are fewer particles than are to share the energy.
+        Raises ConfigError if there are fewer particles than `energy_particles`.
         """
         position = placement.fill(self.box, self.n, self.lattice, even=True)
         if self.energy_particles == 1:
@@ -83,7 +83,8 @@ class Problem(base.Problem):
         n = position.shape[1]
         if n < self.energy_particles:
             raise ConfigError(
-                f"problem.energy_particles = {self.energy_particles}, but there are only {n} in all"
+                f"problem.energy_particles = {self.energy_particles}: expected at most {n}, the "
+                "number of particles"
             )
         mass = self.density * np.prod(self.box[:, 1] - self.box[:, 0]) / n
         energy = np.full(n, eos.internal_energy(self.density, self.background_pressure))
@@ -91,7 +92,7 @@ class Problem(base.Problem):
         return base.InitialState(position, np.zeros_like(position), np.full(n, mass), energy)
 
     def exact(self, eos, time: float, position: np.ndarray) -> dict[str, np.ndarray]:
-        """The self-similar blast of a point, at (D, N) positions; before it, the cold gas."""
+        """Return the self-similar blast at (D, N) positions, with the cold gas ahead of it."""
         offset, radius = self._from_centre(position)
         density = np.full(radius.size, self.density)
         pressure = np.full(radius.size, self.background_pressure)
@@ -100,7 +101,7 @@ class Problem(base.Problem):
             density, speed, pressure = sedov.solve(
                 radius, time, *self._blast(eos), self.background_pressure
             )
-        in_gas = np.where(density > 0.0, density, 1.0)  # empty at the very centre
+        in_gas = np.where(density > 0.0, density, 1.0)  # the density is 0 at the centre
         return {
             "density": density,
             "velocity": speed * offset / np.where(radius > 0.0, radius, 1.0),
@@ -109,7 +110,7 @@ class Problem(base.Problem):
         }
 
     def exact_ends(self, eos) -> tuple[float, str]:
-        """When the shock reaches the nearest face, or gas that is not cold beside it any more.
+        """Return when the shock reaches the nearest face, or the gas ahead no longer is cold.
 
         R ~ t^(2/(D + 2)), and the pressure behind the shock, 2 rho v^2/(gamma + 1), ~ R^-D.
         """
@@ -117,20 +118,20 @@ class Problem(base.Problem):
         first = sedov.shock_radius(*self._blast(eos), 1.0)
         at_face = (self._nearest_face / first) ** (1.0 / power)
         if "open" in self.boundaries:
-            # gas flows out there, behind a wave that runs inward at the speed of sound
+            # gas flows out at open faces, which send a wave inward at the speed of sound
             sound = float(eos.sound_speed(self.density, self.background_pressure))
             at_face = (max(self._nearest_face - sound * at_face, 0.0) / first) ** (1.0 / power)
         behind = 2.0 / (eos.gamma + 1.0) * self.density * (power * first) ** 2  # at t = 1
         cold = (COLD * behind / self.background_pressure) ** (1.0 / (self.dimension * power))
         if cold < at_face:
             return cold, (
-                "problem.background_pressure, which it neglects, becomes more than "
+                "problem.background_pressure, which the exact solution neglects, exceeds "
                 f"{COLD:g} of the pressure behind the shock"
             )
         return at_face, "the shock reaches the nearest face of the domain"
 
     def error_region(self, eos, time: float, position: np.ndarray) -> tuple[np.ndarray, str]:
-        """The blast and a fifth more, as far as the nearest face of the box."""
+        """Return r < 1.2 times the shock radius, at most up to the nearest face of the box."""
         if time == 0.0:
             return super().error_region(eos, time, position)
         shock = sedov.shock_radius(*self._blast(eos), time)
@@ -138,10 +139,10 @@ class Problem(base.Problem):
         return self._from_centre(position)[1] < reach, f"r < {reach:.4g} around the centre"
 
     def report(self, eos, time: float, particles, pressure) -> dict[str, float]:
-        """Radii of the blast.
+        """Return peak_density, peak_radius and momentum_radius.
 
-        `peak_radius` is that of the densest particle, `momentum_radius` is
-        sum m v_r r / sum m v_r, which noise hardly moves.
+        `peak_radius` is that of the densest particle. `momentum_radius` is
+        sum m v_r r / sum m v_r, which is insensitive to noise.
         """
         if time == 0.0:
             return {}
@@ -155,7 +156,7 @@ class Problem(base.Problem):
         return figures if found is None else figures | {"momentum_radius": found}
 
     def compare(self, eos, time: float, particles, pressure) -> dict[str, float]:
-        """The exact ones; `momentum_radius_error` is relative to the exact profile's."""
+        """Return the exact values of `report`, and the relative error of `momentum_radius`."""
         if time == 0.0:
             return {}
         exact = sedov.momentum_weighted_radius(*self._blast(eos), time)
@@ -169,7 +170,7 @@ class Problem(base.Problem):
         return figures | error
 
     def _momentum_radius(self, particles) -> float | None:
-        """None where the gas does not move outward on the whole."""
+        """Return sum m v_r r / sum m v_r, or None if the total of m v_r is not positive."""
         offset, radius = self._from_centre(particles.position)
         # v_r r = v . offset; at the very centre both it and v_r are 0
         moment = particles.mass * (particles.velocity * offset).sum(axis=0)
@@ -178,29 +179,29 @@ class Problem(base.Problem):
 
     @property
     def _nearest_face(self) -> float:
-        """Distance from the centre."""
+        """Distance of the nearest face from the centre."""
         return float((self.box[:, 1] - self.box[:, 0]).min() / 2)
 
     def _blast(self, eos) -> tuple[float, float, float, int]:
-        """What describes the explosion, in the order of `sph.exact.sedov`."""
+        """Return energy, density, gamma and dimension, the arguments of `sph.exact.sedov`."""
         return self.energy, self.density, eos.gamma, self.dimension
 
     def _from_centre(self, position: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Offset (D, N) from the centre of the box, and its length (N,)."""
+        """Return the offset (D, N) from the centre of the box, and its length (N,)."""
         offset = position - self.box.mean(axis=1)[:, None]
         return offset, np.sqrt((offset**2).sum(axis=0))
 
     def _centred(self, position: np.ndarray) -> np.ndarray:
-        """The lattice moved by less than a spacing so that a particle lies in the centre.
+        """Return the lattice shifted by less than a spacing so that a particle is at the centre.
 
-        What leaves the box on one side enters on the other, as if all axes were periodic.
+        Particles that leave the box are wrapped to the other side.
         """
         moved = position - self._from_centre(position)[0][:, self._nearest(position)]
         low, length = self.box[:, :1], np.diff(self.box)
         return low + np.mod(moved - low, length)
 
     def _nearest(self, position: np.ndarray) -> np.ndarray:
-        """Indices of the `energy_particles` nearest the centre; of equally near ones the first."""
+        """Return indices of the `energy_particles` nearest the centre; ties go by index."""
         distance = self._from_centre(position)[1]
         # shells of a lattice lie farther apart than this; equal distances differ by round-off
         in_shells = np.round(distance / distance.max(), 9)

@@ -1,11 +1,11 @@
-"""A Mach 3 shock that runs into sine waves of density, which it compresses and amplifies.
+"""A Mach 3 shock that runs into a sine wave of density, which the shock compresses and amplifies.
 
-Shu & Osher (1989), J. Comput. Phys. 83, 32, problem 8. The solution has no closed form: errors are
-against a finite-volume code that moves with the gas. What to look at are the short waves behind the
-shock, which viscosity flattens.
+Shu & Osher (1989), J. Comput. Phys. 83, 32, problem 8. There is no exact solution: errors are
+computed against a Lagrangian finite-volume solution. The sensitive feature is the train of short
+waves behind the shock, which artificial viscosity damps.
 
-The published domain is [-5, 5], with gas flowing in on the left. Here the box is periodic and
-begins farther left, by as much as the rarefaction crosses that the inflowing gas leaves behind.
+The published domain is [-5, 5], with inflow on the left. Here the box is periodic and extends
+farther to the left, by the distance that the rarefaction from the left end travels.
 """
 
 from functools import lru_cache
@@ -20,19 +20,19 @@ from sph.problems import base
 
 _SHARED = base.Problem.model_fields
 
-# Behind the shock, to the digits that are published; Mach 3 into density 1 and pressure 1
+# State behind the shock, with the published digits: Mach 3 into density 1 and pressure 1
 DENSITY, VELOCITY, PRESSURE = 3.857143, 2.629369, 10.33333
 AHEAD_PRESSURE = 1.0
 DIAPHRAGM = -4.0
 WAVE, WAVENUMBER = 0.2, 5.0
-LEAST_DENSITY = 1.0 - WAVE  # ahead of the shock, where sound is fastest
-# Behind the shock, where its short waves are at the published time of 1.8: 0.5 < x < 2.3
+LEAST_DENSITY = 1.0 - WAVE  # ahead of the shock, where the sound speed is largest
+# Distances behind the shock of the train of short waves: 0.5 < x < 2.3 at the published time of 1.8
 TRAIN = (0.1, 1.9)
 CELLS = 6000  # of the reference
 
 
 class Problem(base.Problem):
-    """A strong shock that runs along x into gas at rest with a sine wave in its density."""
+    """A Mach 3 shock that runs into gas at rest with a sine wave in density."""
 
     defaults: ClassVar = {
         "physics.gamma": 1.4,
@@ -43,7 +43,7 @@ class Problem(base.Problem):
     truth: ClassVar = finite_volume.TRUTH
     limits: ClassVar = {
         "energy_drift": base.Limit(
-            1e-4, "a shock of moderate strength, as in the shock tubes, which keep to 1e-5"
+            1e-4, "a shock of moderate strength, as in the shock tubes, which have 1e-5"
         )
     }
 
@@ -52,21 +52,24 @@ class Problem(base.Problem):
     n: Annotated[int, _SHARED["n"]] = 1600
     domain: list[float] | list[list[float]] = Field(
         default=[-12.5, 5.5],
-        description="[lo, hi]; its ends send waves inward at the speed of sound, lo at that of the "
-        "gas as well (4.57)",
+        description="ends of the box [lo, hi]; waves from the ends move inward, from lo at speed "
+        "4.57, and exclude gas from the errors",
     )
     boundary: Literal["periodic", "open"] = Field(
-        default="periodic", description='"periodic", or "open" where the ends expand into vacuum'
+        default="periodic",
+        description='"periodic", or "open": the gas at the ends expands into vacuum',
     )
 
     @model_validator(mode="after")
     def _holds_the_diaphragm(self):
         if self.box.shape == (1, 2) and not self.box[0, 0] < DIAPHRAGM < self.box[0, 1]:
-            raise ValueError(f"the shock starts at x = {DIAPHRAGM}, which is not in {self.domain}")
+            raise ValueError(
+                f"domain = {self.domain}: expected x = {DIAPHRAGM} inside, where the shock starts"
+            )
         return self
 
     def initial(self, eos) -> base.InitialState:
-        """Particles of one mass at the middles of their shares of the gas, on either side."""
+        """Return particles of equal mass, each at the middle of its mass element."""
         low, high = self.box[0]
         behind, ahead = DENSITY * (DIAPHRAGM - low), _mass_ahead(high)
         n_behind = max(1, round(self.n * behind / (behind + ahead)))
@@ -84,7 +87,7 @@ class Problem(base.Problem):
         )
 
     def exact(self, eos, time: float, position: np.ndarray) -> dict[str, np.ndarray] | None:
-        """The reference of a tube without ends, at (D, N) positions; None for unknown gases."""
+        """Return the reference without ends at (D, N) positions; None without a gamma law."""
         if not is_gamma_law(eos):
             return None
         if time > 0.0:
@@ -100,10 +103,10 @@ class Problem(base.Problem):
         }
 
     def exact_ends(self, eos) -> tuple[float, str]:
-        """When a wave of the flow meets one from an end, both as in `error_region`.
+        """Return when a wave of the flow meets a wave from an end, both as in `error_region`.
 
-        The shock runs at Mach 3 into gas of density 1, and at hardly another speed on the mean of
-        the sine; behind it, the sound that it sends back is slower than the gas.
+        The shock speed is that of Mach 3 into density 1, close to the mean over the sine wave.
+        Left-going sound waves behind the shock are slower than the gas, so they move right.
         """
         (low, high), sound = self.box[0], float(eos.sound_speed(DENSITY, PRESSURE))
         at_low = (DIAPHRAGM - low) / (2.0 * sound)
@@ -114,7 +117,7 @@ class Problem(base.Problem):
         return min(at_low, at_high), f"waves from the end at x = {end:g} meet those of the flow"
 
     def error_region(self, eos, time: float, position: np.ndarray) -> tuple[np.ndarray, str]:
-        """Where no wave from the ends of the box has come."""
+        """Return the region that waves from the ends of the box have not reached."""
         low, high = self.box[0]
         low += (VELOCITY + eos.sound_speed(DENSITY, PRESSURE)) * time
         high -= eos.sound_speed(LEAST_DENSITY, AHEAD_PRESSURE) * time
@@ -122,13 +125,13 @@ class Problem(base.Problem):
         return (low < x) & (x < high), f"{low:.4g} < x < {high:.4g}"
 
     def report(self, eos, time: float, particles, pressure) -> dict[str, float]:
-        """Strength of the short waves behind the shock.
+        """Return the strength of the short waves behind the shock.
 
-        shock_position: of the foremost particle denser than 2, which none ahead of the shock is.
-        wave_density: root mean square of the density about its mean, volume-weighted, from 1.9 to
-        0.1 behind the shock; peak_density: the highest there. Both converge to 0.449 and 4.69 at
-        t = 1.8 (6400 particles; a finite-volume code of second order with 16000 cells gives 0.448
-        and 4.68, its limiter cutting off the crests).
+        shock_position: largest x of a particle denser than 2, a density that occurs only behind the
+        shock; wave_density: volume-weighted root mean square of the density about its mean, from
+        1.9 to 0.1 behind the shock; peak_density: largest density there. The last two converge to
+        0.449 and 4.69 at t = 1.8 (6400 particles). A second-order finite-volume code with 16000
+        cells gives 0.448 and 4.68, because its limiter clips extrema.
         """
         inside, _ = self.error_region(eos, time, particles.position)
         x, density = particles.position[0, inside], particles.density[inside]
@@ -147,7 +150,7 @@ class Problem(base.Problem):
 
 
 def _undisturbed(x: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Density, velocity and pressure (N,) at t = 0."""
+    """Return density, velocity and pressure (N,) at t = 0."""
     behind = x < DIAPHRAGM
     return (
         np.where(behind, DENSITY, 1.0 + WAVE * np.sin(WAVENUMBER * x)),
@@ -157,15 +160,15 @@ def _undisturbed(x: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 
 def _mass_ahead(x):
-    """Mass between the diaphragm and x at t = 0."""
+    """Return the mass between the diaphragm and x at t = 0."""
     wave = np.cos(WAVENUMBER * x) - np.cos(WAVENUMBER * DIAPHRAGM)
     return x - DIAPHRAGM - WAVE / WAVENUMBER * wave
 
 
 def _inverse_mass(mass: np.ndarray) -> np.ndarray:
-    """x (N,) up to which that mass (N,) lies ahead of the diaphragm: Newton's iteration."""
+    """Return x (N,) such that `_mass_ahead(x)` is `mass` (N,), by Newton's iteration."""
     x = DIAPHRAGM + mass
-    for _ in range(20):  # a guard: the density is within 20 % of 1, and 6 are enough
+    for _ in range(20):  # 6 suffice, since the density is within 20 % of 1
         step = (_mass_ahead(x) - mass) / _undisturbed(x)[0]
         x -= step
         if np.all(np.abs(step) <= 1e-15 * (1.0 + np.abs(x))):
@@ -175,7 +178,7 @@ def _inverse_mass(mass: np.ndarray) -> np.ndarray:
 
 @lru_cache(maxsize=16)
 def _reference(eos, time: float, end: float) -> finite_volume.Cells:
-    """Cells of nearly one mass, moved on: from as far as sound gets behind the shock to `end`."""
+    """Return the reference: cells of nearly equal mass, from beyond the reach of sound to `end`."""
     start = DIAPHRAGM - 1.1 * float(eos.sound_speed(DENSITY, PRESSURE)) * time
     behind, ahead = DENSITY * (DIAPHRAGM - start), float(_mass_ahead(end))
     n_behind = round(CELLS * behind / (behind + ahead))

@@ -1,17 +1,16 @@
-"""Travelling sound wave: one wavelength in a periodic box, along x, in 1 to 3-D.
+"""Travelling sound wave: one wavelength in a periodic box, along x, in 1-D to 3-D.
 
-The wave is a simple wave (Landau & Lifshitz, Fluid Mechanics, paragraph 101): the Riemann invariant
-of the waves that go left is uniform, so that velocity v and sound speed c at t = 0 obey
-c = c0 + (gamma - 1) v / 2, and each value travels at v + c for ever. That is exact at any
-amplitude until the crests overtake the troughs, so the linear and the weakly nonlinear wave have
-one exact solution. Units are such that the undisturbed gas has density 1 and sound speed 1: the
-wave crosses a box of length 1 once in a time of 1.
+The wave is a simple wave (Landau & Lifshitz, Fluid Mechanics, paragraph 101). The Riemann invariant
+of left-going waves is uniform, so velocity v and sound speed c obey c = c0 + (gamma - 1) v / 2, and
+each value travels at v + c. This solution is exact at any amplitude until the wave breaks. In the
+code units of this problem, undisturbed gas has density 1 and sound speed 1, so the wave crosses a
+box of length 1 in time 1.
 
-How wrong a wave of amplitude 1e-6 is cannot be read off the norms of density and pressure: the
-density sum over a lattice is high by 0.25 % (1-D, Wendland C2, eta = 1.6) everywhere, two thousand
-times the wave. The report therefore gives errors of the wave alone, in units of its amplitude:
-velocity, whose undisturbed value is exactly zero, density relative to its own mean, and, from the
-wave's Fourier component, the errors of its amplitude and of the speed at which it travelled.
+Norms of density and pressure do not measure the error of a wave of amplitude 1e-6, because the
+density sum on a lattice is 0.25 % too high (1-D, Wendland C2, eta = 1.6), which is two thousand
+times the wave. The summary therefore gives errors relative to the amplitude: of the velocity, of
+the density relative to its mean, and, from the Fourier component of the wave, of its amplitude and
+phase speed.
 """
 
 from typing import Annotated, ClassVar, Literal
@@ -19,16 +18,16 @@ from typing import Annotated, ClassVar, Literal
 import numpy as np
 from pydantic import Field, field_validator
 
-from sph import lattice as placement
 from sph.problems import base
+from sph.problems.support import lattice as placement
 
 _SHARED = base.Problem.model_fields
 
-SAMPLES = 64  # of a wavelength; harmonics fall as amplitude^k, so 32 of them reach round-off
+SAMPLES = 64  # per wavelength: harmonic k is of order amplitude^k, so 32 reach round-off
 
 
 class Problem(base.Problem):
-    """Sound wave of small amplitude that travels along x in a periodic box."""
+    """A sound wave that travels along x in a periodic box."""
 
     defaults: ClassVar = {
         "physics.gamma": 5.0 / 3.0,
@@ -39,15 +38,15 @@ class Problem(base.Problem):
     ideal_gas: ClassVar = True
     limits: ClassVar = {
         "energy_drift": base.Limit(
-            1e-12, "the wave is 1e-12 of the whole energy: round-off of some hundred steps"
+            1e-12, "the wave has 1e-12 of the total energy: round-off of a few hundred steps"
         ),
         "error_velocity_relative": base.Limit(
-            0.004, "0.0030 with 128 particles, of second order: its waves run 0.08 % too fast"
+            0.004, "measured: 0.0030 with 128 particles, from a phase speed 0.08 % too high"
         ),
     }
 
     swamped: ClassVar = {
-        "error_velocity_relative": base.Limit(0.5, "half of the wave's own amplitude"),
+        "error_velocity_relative": base.Limit(0.5, "half of the wave's amplitude"),
     }
 
     name: Literal["sound_wave"] = "sound_wave"
@@ -55,21 +54,22 @@ class Problem(base.Problem):
     n: Annotated[int, _SHARED["n"]] = 128
     domain: list[float] | list[list[float]] = Field(
         default=[0.0, 1.0],
-        description="[lo, hi] along x, one wavelength (y and z are an eighth as wide), or one "
-        "[lo, hi] per axis",
+        description="ends of the box: [lo, hi] along x, one wavelength (y and z are then an eighth "
+        "as wide), or a list with one [lo, hi] per axis",
     )
-    boundary: Literal["periodic"] = Field(default="periodic", description="of all axes")
+    boundary: Literal["periodic"] = Field(default="periodic", description="boundary of all axes")
     amplitude: float = Field(
         default=1e-6,
-        ge=1e-8,  # below, the 1e-10 to which supports are converged shows
+        ge=1e-8,  # below, the tolerance 1e-10 of support radii becomes visible
         le=0.1,  # above, the wave breaks before it has crossed the box
-        description="largest velocity in units of the sound speed",
+        description="amplitude of the velocity in units of the sound speed",
     )
     lattice: Literal["cubic", "hexagonal", "bcc", "relaxed"] = Field(
         default="cubic",
-        description='"cubic", "hexagonal" (2-D), "bcc" (3-D) or "relaxed", a glass, whose noise '
-        "hides waves below some 1e-2; in 2-D lattices of the default kernel come apart above some "
-        '10,000 particles: take "hexagonal" with wendland_c4 at physics.eta = 2.2',
+        description='initial lattice: "cubic", "hexagonal" (2-D), "bcc" (3-D), or "relaxed", a '
+        "disordered glass, whose noise hides amplitudes below about 1e-2; in 2-D with more than "
+        'about 10,000 particles use "hexagonal" with kernel wendland_c4 and physics.eta = 2.2, '
+        "because lattices are unstable with the default kernel",
     )
 
     @field_validator("lattice")
@@ -86,29 +86,29 @@ class Problem(base.Problem):
         return np.array([domain] + [[-sixteenth, sixteenth]] * (self.dimension - 1))
 
     def allowed(self) -> dict[str, base.Limit]:
-        """A wave has amplitude^2 of the energy; in 2-D and 3-D its error has a floor of 1.6 %."""
+        """Return limits for this amplitude (energy ~ amplitude^2) and dimension."""
         drift = self.limits["energy_drift"]
         drift = drift._replace(bound=max(drift.bound, self.amplitude**2))
         error = self.limits["error_velocity_relative"]
         if self.dimension > 1:
-            reason = "lattices at the default eta make waves up to 0.4 % too fast or too slow"
+            reason = "lattices at the default eta change the phase speed by up to 0.4 %"
             error = base.Limit(0.03, reason)
         return {"energy_drift": drift, "error_velocity_relative": error}
 
     def initial(self, eos) -> base.InitialState:
-        """Particles of one mass, on a lattice stretched along x to the density of the wave."""
+        """Return particles of equal mass on a lattice stretched along x to give the density."""
         position = placement.fill(self.box, self.n, self.lattice)
         low, high = self.box[0]
         share = (position[0] - low) / (high - low)  # of the mass, left of a particle
         position[0] = low + (high - low) * _inverse_mass(self._harmonics(eos), share)
-        state = self.exact(eos, 0.0, position)
+        state = self.exact(eos, 0.0, position) or {}
         n = position.shape[1]
         volume = np.prod(self.box[:, 1] - self.box[:, 0])
         mass = np.full(n, self._harmonics(eos)[0].real * volume / n)
         return base.InitialState(position, state["velocity"], mass, state["internal_energy"])
 
     def exact(self, eos, time: float, position: np.ndarray) -> dict[str, np.ndarray] | None:
-        """The simple wave at (D, N) positions; None from the time on at which it breaks."""
+        """Return the simple wave at (D, N) positions; None after the wave breaks."""
         low, high = self.box[0]
         steepening = self._steepening(eos, time)
         if 2.0 * np.pi * steepening >= 1.0:
@@ -130,11 +130,11 @@ class Problem(base.Problem):
         return 1.0 / (2.0 * np.pi * self._steepening(eos, 1.0)), "the wave breaks"
 
     def compare(self, eos, time: float, particles, pressure) -> dict[str, float]:
-        """Errors of the wave alone, relative to its amplitude (see the head of this file).
+        """Return errors relative to the wave's amplitude (see the head of this file).
 
-        error_velocity_relative, error_density_relative: volume-weighted L1, density over its mean;
-        wave_amplitude_error, phase_speed_error: of the velocity's Fourier component over that of
-        the exact velocity at the same particles, minus 1; the phase speed is that since t = 0.
+        error_velocity_relative, error_density_relative: volume-weighted L1 norms, the density
+        divided by its mean; wave_amplitude_error, phase_speed_error: relative errors of the Fourier
+        component of the velocity, the phase speed being the mean since t = 0.
         """
         exact = self.exact(eos, time, particles.position)
         if exact is None:
@@ -158,24 +158,24 @@ class Problem(base.Problem):
         return figures
 
     def _steepening(self, eos, time: float) -> float:
-        """(v + c - 1) t in wavelengths is this times sin(2 pi phase at t = 0)."""
+        """Return the factor of sin(2 pi phase at t = 0) in (v + c - 1) t, in wavelengths."""
         low, high = self.box[0]
         return 0.5 * (eos.gamma + 1.0) * self.amplitude * time / (high - low)
 
     def _harmonics(self, eos) -> np.ndarray:
-        """Fourier coefficients of the density at t = 0; the first is its mean."""
+        """Return the Fourier coefficients of the density at t = 0; the first is its mean."""
         phase = np.arange(SAMPLES) / SAMPLES
         speed = self.amplitude * np.sin(2.0 * np.pi * phase)
         return np.fft.rfft(_density(speed, eos.gamma))[: SAMPLES // 2] / SAMPLES
 
 
 def _density(speed: np.ndarray, gamma: float) -> np.ndarray:
-    """Density (N,) where the simple wave has that velocity: adiabatic, by the sound speed."""
+    """Return the density (N,) at which the simple wave has velocity `speed` (N,)."""
     return (1.0 + 0.5 * (gamma - 1.0) * speed) ** (2.0 / (gamma - 1.0))
 
 
 def _inverse_mass(harmonics: np.ndarray, share: np.ndarray) -> np.ndarray:
-    """Phase (N,), in wavelengths, left of which `share` (N,) of a wavelength's mass lies."""
+    """Return the phase (N,), in wavelengths, up to which the mass fraction is `share` (N,)."""
     relative = harmonics / harmonics[0]
     order = np.flatnonzero(np.abs(relative) > 1e-17)[1:]
     wave = 2j * np.pi * order
@@ -192,12 +192,12 @@ def _inverse_mass(harmonics: np.ndarray, share: np.ndarray) -> np.ndarray:
 
 
 def _phase_at_start(phase: np.ndarray, steepening: float) -> np.ndarray:
-    """Solve start + steepening sin(2 pi start) = phase, which is Kepler's equation: Newton.
+    """Solve start + steepening sin(2 pi start) = phase (Kepler's equation) by Newton's iteration.
 
-    The root is within `steepening` of phase; steps that leave that range are cut to it.
+    The root is within `steepening` of `phase`; iterates are clipped to that range.
     """
     start = phase.copy()
-    for _ in range(50):  # a guard: 5 are enough unless the wave is about to break
+    for _ in range(50):  # 5 suffice unless the wave is about to break
         angle = 2.0 * np.pi * start
         excess = start + steepening * np.sin(angle) - phase
         slope = 1.0 + 2.0 * np.pi * steepening * np.cos(angle)

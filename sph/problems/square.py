@@ -1,7 +1,7 @@
-"""Hydrostatic square: dense gas at rest in thin gas of the same pressure. Nothing should happen.
+"""Steady-state test: a square of dense gas at rest in thin gas of equal pressure.
 
-Saitoh & Makino (2013), ApJ 768, 44, section 5.4. A scheme whose pressure jumps at a contact pulls
-on the boundary like a surface tension and rounds the square.
+Saitoh & Makino (2013), ApJ 768, 44, section 5.4. A scheme with a pressure error at contacts has a
+spurious surface tension, which makes the square round.
 """
 
 from typing import Annotated, ClassVar, Literal
@@ -9,19 +9,19 @@ from typing import Annotated, ClassVar, Literal
 import numpy as np
 from pydantic import Field
 
-from sph.lattice import grid
 from sph.problems import base
-from sph.problems.kelvin_helmholtz_smooth import only
+from sph.problems.base import only
+from sph.problems.support.lattice import grid
 
 _SHARED = base.Problem.model_fields
 
-DENSITY = (1.0, 4.0)  # outside, inside: spacings of particles of one mass are 2 to 1
+DENSITY = (1.0, 4.0)  # outside, inside: with equal masses the spacings are 2 to 1
 PRESSURE = 2.5
 HALF = 0.25  # half the side of the square
 
 
 class Problem(base.Problem):
-    """A dense square in pressure balance with the thin gas around it."""
+    """A dense square in pressure equilibrium with thin gas: a steady-state test."""
 
     defaults: ClassVar = {
         "physics.gamma": 5.0 / 3.0,
@@ -32,7 +32,7 @@ class Problem(base.Problem):
     profiled: ClassVar = False
     limits: ClassVar = {
         "energy_drift": base.Limit(
-            1e-4, "gas that hardly moves: kinetic energy stays below some 1e-3 of the whole"
+            1e-4, "nearly at rest: kinetic energy stays below about 1e-3 of the total"
         )
     }
 
@@ -42,10 +42,10 @@ class Problem(base.Problem):
     domain: Annotated[list[float] | list[list[float]], _SHARED["domain"], only([-0.5, 0.5])] = (
         Field(default=[-0.5, 0.5])
     )
-    boundary: Literal["periodic"] = Field(default="periodic", description="of both axes")
+    boundary: Literal["periodic"] = Field(default="periodic", description="boundary of both axes")
 
     def initial(self, eos) -> base.InitialState:
-        """Particles of one mass on two cubic lattices; those of the square come first."""
+        """Return particles of equal mass on two cubic lattices, those of the square first."""
         cells = self._cells()
         inside = self._dense_lattice()
         around = grid(self.box, "cubic", (cells, cells))
@@ -57,7 +57,7 @@ class Problem(base.Problem):
         return base.InitialState(position, state["velocity"], mass, state["internal_energy"])
 
     def exact(self, eos, time: float, position: np.ndarray) -> dict[str, np.ndarray]:
-        """The initial state for ever, at any (D, N) positions."""
+        """Return the initial state at (D, N) positions, which is steady."""
         is_inside = np.abs(position).max(axis=0) < HALF
         density = np.where(is_inside, *DENSITY[::-1])
         pressure = np.full(is_inside.size, PRESSURE)
@@ -69,13 +69,11 @@ class Problem(base.Problem):
         }
 
     def report(self, eos, time: float, particles, pressure) -> dict[str, float]:
-        """Shape of the dense gas.
+        """Return squareness and dense_outside, which describe the shape of the dense gas.
 
-        squareness: sum r^4 cos 4 phi / sum r^4 of the dense particles, relative to that of a
-        square: 1 as long as it is one, 0 for a disc, negative for a diamond, and above 1 where the
-        sides are drawn in. dense_outside: the share of them that is outside the square, 0.09 for a
-        disc. The error of the internal energy, which particles carry with them, tells the same: it
-        is 2.8 times the area that holds the wrong gas.
+        squareness: sum r^4 cos 4 phi / sum r^4 over the dense particles, relative to that of a
+        square: 1 for a square, 0 for a disc, negative for a diamond, above 1 for concave sides.
+        dense_outside: fraction of the dense particles outside the initial square, 0.09 for a disc.
         """
         dense = particles.position[:, particles.id <= self._cells() ** 2]
         outside = np.abs(dense).max(axis=0) > HALF
@@ -98,6 +96,6 @@ class Problem(base.Problem):
 
 
 def _fourfold(position: np.ndarray) -> float:
-    """Sum of r^4 cos 4 phi over that of r^4, of (2, N) positions."""
+    """Return sum r^4 cos 4 phi / sum r^4 of (2, N) positions."""
     x, y = position
     return float((x**4 - 6.0 * x**2 * y**2 + y**4).sum() / ((x**2 + y**2) ** 2).sum())

@@ -1,4 +1,4 @@
-"""Uniform gas at rest or in motion, on a lattice or with noise: nothing should happen."""
+"""Steady-state test: uniform gas at rest or in motion, on a lattice or with noise."""
 
 import math
 from typing import Annotated, ClassVar, Literal
@@ -6,15 +6,16 @@ from typing import Annotated, ClassVar, Literal
 import numpy as np
 from pydantic import Field, field_validator
 
-from sph import lattice as placement
 from sph.exact import riemann
-from sph.problems import _ends, base
+from sph.problems import base
+from sph.problems.support import boundary_waves
+from sph.problems.support import lattice as placement
 
 _SHARED = base.Problem.model_fields
 
 
 class Problem(base.Problem):
-    """Uniform gas at rest or in uniform motion: the null test."""
+    """Uniform gas at rest or in uniform motion: a steady-state test."""
 
     defaults: ClassVar = {
         "physics.gamma": 1.4,
@@ -24,7 +25,7 @@ class Problem(base.Problem):
     }
     limits: ClassVar = {
         "energy_drift": base.Limit(
-            1e-10, "on a lattice all forces cancel: round-off of some hundred steps, with room"
+            1e-10, "forces on a lattice cancel: round-off of a few hundred steps, with a margin"
         )
     }
 
@@ -35,21 +36,23 @@ class Problem(base.Problem):
         default=[0.0, 1.0]
     )
     boundary: Annotated[base.Boundary | list[base.Boundary], _SHARED["boundary"]] = "periodic"
-    density: float = Field(default=1.0, gt=0.0, description="mass per volume")
+    density: float = Field(default=1.0, gt=0.0, description="density")
     pressure: float = Field(default=1.0, gt=0.0, description="pressure")
     velocity: float | list[float] = Field(
-        default=0.0, description="velocity: a number along x, or a list with one for each axis"
+        default=0.0, description="velocity: a number, along x, or a list with one per axis"
     )
     lattice: Literal["cubic", "hexagonal", "bcc", "relaxed", "random"] = Field(
         default="cubic",
-        description='"cubic", "hexagonal" (2-D), "bcc" (3-D), "relaxed", a glass, or "random", '
-        "each particle anywhere",
+        description='initial lattice: "cubic", "hexagonal" (2-D), "bcc" (3-D), "relaxed", a '
+        'disordered glass, or "random", uniformly distributed positions',
     )
     noise: float = Field(
-        default=0.0, ge=0.0, le=0.5, description="largest shift along each axis, in spacings"
+        default=0.0, ge=0.0, le=0.5, description="largest random shift along each axis, in spacings"
     )
     seed: int = Field(
-        default=0, ge=0, description="seed of noise, relaxed lattice and random places"
+        default=0,
+        ge=0,
+        description="seed of random numbers, for noise and for relaxed or random positions",
     )
 
     @field_validator("velocity")
@@ -57,7 +60,7 @@ class Problem(base.Problem):
     def _one_per_axis(cls, velocity, known):
         dimension = known.data.get("dimension")
         if isinstance(velocity, list) and dimension and len(velocity) != dimension:
-            raise ValueError(f"{velocity} has not one component for each of {dimension} axes")
+            raise ValueError(f"{velocity}: expected {dimension} components, one per axis")
         return velocity
 
     @field_validator("lattice")
@@ -66,10 +69,10 @@ class Problem(base.Problem):
         return placement.checked(kind, known.data.get("dimension"))
 
     def allowed(self) -> dict[str, base.Limit]:
-        """The shipped limit is for lattices: off them particles move until they have settled."""
+        """Return the limits: without a lattice, particles move until they have settled."""
         if self.noise == 0.0 and self.lattice not in ("relaxed", "random"):
             return self.limits
-        return {"energy_drift": base.Limit(1e-3, "what the time integration may lose on any gas")}
+        return {"energy_drift": base.Limit(1e-3, "error of the time integration in any flow")}
 
     def initial(self, eos) -> base.InitialState:
         position = placement.fill(self.box, self.n, self.lattice, self.seed)
@@ -82,7 +85,7 @@ class Problem(base.Problem):
         return base.InitialState(position, state["velocity"], mass, state["internal_energy"])
 
     def exact(self, eos, time: float, position: np.ndarray) -> dict[str, np.ndarray]:
-        """The uniform state, at any (D, N) positions and for ever."""
+        """Return the uniform state at (D, N) positions, which is steady."""
         n = position.shape[1]
         density, pressure = np.full(n, self.density), np.full(n, self.pressure)
         velocity = np.zeros_like(position) + self._velocity[:, None]
@@ -94,9 +97,11 @@ class Problem(base.Problem):
         }
 
     def fills_box(self, eos) -> bool:
-        """Unless it leaves a wall faster than it can expand."""
+        """Return whether no vacuum opens at a wall from which the gas moves away."""
         walls = zip(self.boundaries, self._states(), strict=True)
-        return not any(_ends.opens_vacuum(kind, state, state, eos) for kind, state in walls)
+        return not any(
+            boundary_waves.opens_vacuum(kind, state, state, eos) for kind, state in walls
+        )
 
     def undisturbed(self, eos, time: float) -> np.ndarray:
         return np.array(
@@ -104,7 +109,7 @@ class Problem(base.Problem):
         )
 
     def exact_ends(self, eos) -> tuple[float, str]:
-        """When the waves from both ends of an axis have met; never where none sends any."""
+        """Return when the waves from both ends of an axis meet; infinity if there are none."""
         first = math.inf, ""
         for axis, ends, (low, high) in zip("xyz", self._ends(eos), self.box, strict=False):
             closing = ends.low - ends.high
@@ -113,7 +118,7 @@ class Problem(base.Problem):
         return first
 
     def report(self, eos, time: float, particles, pressure) -> dict[str, float]:
-        """Largest over smallest of what is to stay uniform, minus 1."""
+        """Return density_spread and energy_spread: largest over smallest value, minus 1."""
         density, energy = particles.density, particles.internal_energy
         return {
             "density_spread": float(density.max() / density.min() - 1.0),
@@ -121,13 +126,13 @@ class Problem(base.Problem):
         }
 
     def compare(self, eos, time: float, particles, pressure) -> dict[str, float]:
-        """crossings: lengths of the box along x that the gas has moved."""
+        """Return crossings: distance moved along x, in lengths of the box."""
         length = float(self.box[0, 1] - self.box[0, 0])
         return {"crossings": float(abs(self._velocity[0]) * time / length)}
 
     @property
     def _velocity(self) -> np.ndarray:
-        """(D,) of the gas."""
+        """(D,) velocity of the gas."""
         velocity = np.zeros(self.dimension)
         if isinstance(self.velocity, list):
             velocity += self.velocity
@@ -135,11 +140,11 @@ class Problem(base.Problem):
             velocity[0] = self.velocity
         return velocity
 
-    def _ends(self, eos) -> list[_ends.Ends]:
-        """The waves from the ends of each axis."""
+    def _ends(self, eos) -> list[boundary_waves.Ends]:
+        """Return the waves from the ends of each axis."""
         axes = zip(self.boundaries, self._states(), strict=True)
-        return [_ends.of(boundary, state, state, eos) for boundary, state in axes]
+        return [boundary_waves.of(boundary, state, state, eos) for boundary, state in axes]
 
     def _states(self) -> list[riemann.State]:
-        """The gas, with its velocity along each axis."""
+        """Return the state of the gas for each axis, with the velocity along that axis."""
         return [riemann.State(self.density, float(v), self.pressure) for v in self._velocity]

@@ -1,7 +1,7 @@
 """Isentropic vortex: a smooth steady vortex in gas of uniform entropy.
 
-Yee, Vinokur & Djomehri (2000), J. Comput. Phys. 162, 33, section 5: with all derivatives continuous
-it shows the order of a method where Gresho's vortex, which has kinks, cannot.
+Yee, Vinokur & Djomehri (2000), J. Comput. Phys. 162, 33, section 5. All derivatives are continuous,
+unlike in the Gresho vortex, so this problem shows the order of convergence of a method.
 """
 
 from typing import Annotated, ClassVar, Literal
@@ -9,18 +9,19 @@ from typing import Annotated, ClassVar, Literal
 import numpy as np
 from pydantic import Field
 
-from sph import lattice as placement
 from sph.problems import base
-from sph.problems.gresho import from_centre, rotation, wide
+from sph.problems.base import wide
+from sph.problems.support import lattice as placement
+from sph.problems.support.vortex import from_centre, rotation
 
 _SHARED = base.Problem.model_fields
 
-STRENGTH = 5.0  # beta of the paper
-WIDTH = 10.0  # at whose edge the gas still goes round at 2.5e-5 of the sound speed
+STRENGTH = 5.0  # beta of Yee et al.
+WIDTH = 10.0  # least width of the box; at its edge the rotation is 2.5e-5 of the sound speed
 
 
 class Problem(base.Problem):
-    """A smooth steady vortex in the middle of a periodic square, at rest or carried along."""
+    """A smooth steady vortex in a periodic square, at rest or in uniform motion."""
 
     defaults: ClassVar = {
         "physics.gamma": 1.4,
@@ -31,7 +32,7 @@ class Problem(base.Problem):
     ideal_gas: ClassVar = True
     limits: ClassVar = {
         "energy_drift": base.Limit(
-            1e-3, "a smooth flow, whose energy the scheme conserves to the order of the time step"
+            1e-3, "a smooth flow, with the energy error of the time step only"
         ),
     }
 
@@ -41,23 +42,24 @@ class Problem(base.Problem):
     domain: Annotated[list[float] | list[list[float]], _SHARED["domain"], wide(WIDTH)] = Field(
         default=[-5.0, 5.0]
     )
-    boundary: Literal["periodic"] = Field(default="periodic", description="of both axes")
+    boundary: Literal["periodic"] = Field(default="periodic", description="boundary of both axes")
     velocity: list[float] = Field(
         default=[0.0, 0.0],
         min_length=2,
         max_length=2,
-        description="bulk motion [vx, vy], which carries the vortex along",
+        description="uniform velocity [vx, vy] of the vortex",
     )
     lattice: Literal["cubic", "hexagonal", "relaxed"] = Field(
-        default="cubic", description='"cubic", "hexagonal" or "relaxed", a glass'
+        default="cubic",
+        description='initial lattice: "cubic", "hexagonal", or "relaxed", a disordered glass',
     )
 
     def initial(self, eos) -> base.InitialState:
-        """An undisturbed lattice with masses by the density.
+        """Return a regular lattice whose masses follow the density.
 
-        A lattice stretched to particles of one mass, whose cells are then sheared, was worse: L1 of
-        density at t = 1 0.0059 instead of 0.0054 with 64 x 64, of velocity at t = 10 0.0322
-        instead of 0.0318. The masses stay smooth, as particles go round at their own radius.
+        A lattice stretched to equal masses was worse: with 64 x 64 particles, the L1 error of
+        density at t = 1 was 0.0059 instead of 0.0054, of velocity at t = 10 0.0322, not 0.0318.
+        The masses stay smooth in space, because particles rotate at constant radius.
         """
         position = placement.fill(self.box, self.n, self.lattice)
         n = position.shape[1]
@@ -68,7 +70,7 @@ class Problem(base.Problem):
         )
 
     def exact(self, eos, time: float, position: np.ndarray) -> dict[str, np.ndarray]:
-        """The initial vortex, carried along by the bulk motion, at any (D, N) positions."""
+        """Return the initial vortex, moved with the uniform velocity, at (D, N) positions."""
         offset, radius = from_centre(self.box, position, self.velocity, time)
         # rotation rate, and P/rho, which is 1 far away; P = rho^gamma
         rate = STRENGTH / (2.0 * np.pi) * np.exp(0.5 * (1.0 - radius**2))

@@ -1,1 +1,1 @@
-"""How far C or eta of a configuration is from where its runs stop being good, by bisection."""
+"""The range of C or eta for which runs of a configuration stay stable, by bisection."""

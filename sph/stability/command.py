@@ -1,4 +1,4 @@
-"""A search from its command line to its result."""
+"""A search, from the command line to its result."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -14,7 +14,7 @@ from sph.sweep.local import available_processors
 
 
 class Key(NamedTuple):
-    """Where the ends of a key are looked for: strides from the configuration's value."""
+    """How the ends of the stable range of a key are searched: strides from the configured value."""
 
     strides: dict[str, Stride]  # by the name of the end
 
@@ -29,7 +29,7 @@ KEYS = {
 
 @dataclass(frozen=True)
 class Found:
-    """What a search came to."""
+    """The result of a search."""
 
     config: str
     key: str
@@ -48,7 +48,7 @@ class Found:
         return next(trial for trial in self.trials if trial.value == value)
 
     def islands(self, end: str) -> list[float]:
-        """Values beyond an end that are stable nevertheless."""
+        """Stable values beyond an end of the range."""
         outside = self.edges[end].outside
         if outside is None:
             return []
@@ -61,7 +61,7 @@ def run(
     config: Path, key: str, overrides: Sequence[str], directory: Path,
     limits: Sequence[str] = (), jobs: int | None = None,
 ) -> Found:  # fmt: skip
-    """Look for the ends of `key` in KEYS. Raises as `Trials`, and ConfigError for other keys."""
+    """Search the stable range of `key`, one of KEYS. Raises ConfigError, and as `Trials`."""
     if key not in KEYS:
         raise ConfigError(f"--key {key}: expected one of {', '.join(KEYS)}")
     criterion, jobs = Criterion.of(limits), jobs or available_processors()

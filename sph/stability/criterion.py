@@ -1,6 +1,5 @@
-"""When a run is stable: by its status, errors, energy and limits, beside a run of small steps."""
+"""When a run is stable: its status, errors, energy and limits, against a run with small steps."""
 
-import json
 from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
@@ -14,12 +13,13 @@ from sph.output import checkpoint as checkpoints
 from sph.output.checkpoint import Checkpoint
 from sph.output.run_directory import RunDirectory
 from sph.problems.base import Limit
+from sph.summary import Summary, figure
 
 NONE = float("nan")
 
 
 class Criterion(NamedTuple):
-    """What a run must keep to be called stable; every default stands here alone."""
+    """The criteria of stability; every default stands here alone."""
 
     # C of the reference run, as a part of the configuration's: errors of the step fall as C^2, so
     # that what a quarter leaves of them is small beside what error_growth allows.
@@ -56,7 +56,7 @@ ABOVE_ONE = ("error_growth", "resolution")
 
 @dataclass(frozen=True)
 class Trial:
-    """A run at a value of the key, and what came of it."""
+    """A run at a value of the key, and its verdict."""
 
     value: float
     name: str  # its directory
@@ -67,7 +67,7 @@ class Trial:
     drift: float  # largest |E - E_0|/|E_0| at any step
     time: float  # reached
     steps: int
-    cpu: float  # seconds without compiling
+    cpu: float  # CPU seconds
 
     @property
     def is_stable(self) -> bool:
@@ -75,15 +75,15 @@ class Trial:
 
 
 class Judge:
-    """Judges runs beside a reference run of the same particles."""
+    """Judges runs against a reference run of the same particles."""
 
     def __init__(self, reference: Path, criterion: Criterion, holds_report: bool = True):
-        """Raises NumericalError where the reference itself came to no end, FileError.
+        """Raises NumericalError where the reference run itself failed, and FileError.
 
         holds_report: whether figures of the report must be the reference's where nothing is exact.
         """
         self.directory = reference
-        self.summary = read_summary(reference)
+        self.summary = RunDirectory(reference).whole_summary()
         if self.summary["status"] != "done":
             raise NumericalError(
                 f"the reference run {reference.name} fails: {self.summary['reason']}\nTry: "
@@ -103,12 +103,12 @@ class Judge:
         return self.summary["errors"] is not None
 
     def trial(self, value: float, directory: Path) -> Trial:
-        """The trial whose run, ended, is in `directory`. Raises FileError."""
-        summary = read_summary(directory)
-        drift = float(summary["conservation"]["energy_drift_max"])
-        numbers = (drift, float(summary["time"]), summary["steps"], _cpu(summary))
+        """The trial from the run in `directory`, which has ended. Raises FileError."""
+        summary = RunDirectory(directory).whole_summary()
+        drift = summary["conservation"]["energy_drift_max"]
+        numbers = (drift, summary["time"], summary["steps"], summary["cost"]["cpu_seconds"])
         if summary["status"] == "failed":
-            reason = first_line(summary["reason"])
+            reason = first_line(summary["reason"] or "")
             return Trial(value, directory.name, "failed", reason, NONE, "", *numbers)
         errors = self._errors(summary, directory)
         field = max(errors, key=lambda name: _closeness(errors[name] / self.errors[name]))
@@ -131,7 +131,7 @@ class Judge:
         )  # fmt: skip
 
     def in_words(self) -> str:
-        """What runs are held to."""
+        """The criteria, in words."""
         if self.has_exact:
             errors = (
                 f"L1 errors of all fields at most {self.criterion.error_growth:g} times those at "
@@ -157,7 +157,7 @@ class Judge:
         """The problem's limit, or error_growth times what the reference does where that is more."""
         limit = self.state.config.problem.limits.get("energy_drift")
         bound = self.state.config.physics.max_energy_drift if limit is None else limit.bound
-        own = float(self.summary["conservation"]["energy_drift_max"])
+        own = self.summary["conservation"]["energy_drift_max"]
         return max(bound, self.criterion.error_growth * own)
 
     def _limits_of_figures(self) -> dict[str, Limit]:
@@ -169,13 +169,13 @@ class Judge:
         found, growth = {}, self.criterion.error_growth
         for name, limit in self.state.config.problem.limits.items():
             own = _figure(self.summary, name)
-            if name == "energy_drift" or own != own:
+            if name == "energy_drift" or name.startswith("l1.") or own != own:
                 continue
             beyond = own / growth if limit.at_least else own * growth
             found[name] = limit if limit.holds(own) else limit._replace(bound=beyond)
         return found
 
-    def _other_figures(self, summary: dict) -> list[str]:
+    def _other_figures(self, summary: Summary) -> list[str]:
         """Words for figures of the report that are not the reference's, where nothing is exact."""
         found, figures, criterion = [], self._numbers(summary), self.criterion
         for name, own in self.report.items():
@@ -185,8 +185,8 @@ class Judge:
         return found
 
     @staticmethod
-    def _numbers(summary: dict) -> dict[str, float]:
-        return {name: float(value) for name, value in (summary["report"] or {}).items()}
+    def _numbers(summary: Summary) -> dict[str, float]:
+        return summary["report"] or {}
 
     def _largest_errors(self) -> dict[str, float]:
         """The largest L1 error that a stable run has, by field."""
@@ -194,17 +194,16 @@ class Judge:
         if not self.has_exact:
             return {name: self.criterion.deviation * size for name, size in sizes.items()}
         growth, negligible = self.criterion.error_growth, self.criterion.negligible
-        fields = self.summary["errors"]["fields"]
+        fields = self.summary["errors"]["fields"] if self.summary["errors"] else {}
         return {
-            name: max(growth * float(norm["L1"]), negligible * sizes[name])
+            name: max(growth * norm["L1"], negligible * sizes[name])
             for name, norm in fields.items()
         }
 
-    def _errors(self, summary: dict, directory: Path) -> dict[str, float]:
+    def _errors(self, summary: Summary, directory: Path) -> dict[str, float]:
         """L1 errors by field: against the exact solution, or else against the reference."""
         if self.has_exact:
-            fields = (summary["errors"] or {}).get("fields", {})
-            return {name: float(fields.get(name, {}).get("L1", NONE)) for name in self.errors}
+            return {name: _figure(summary, f"l1.{name}") for name in self.errors}
         state = _last(directory)
         own = self.state
         volume = own.by_id(own.particles.mass / own.particles.density)
@@ -214,16 +213,10 @@ class Judge:
         }
 
 
-def read_summary(directory: Path) -> dict:
-    """The summary of a run that has ended; numbers that JSON has not are words for `float`."""
-    return json.loads(RunDirectory(directory).summary.read_text(encoding="utf-8"))
-
-
-def _figure(summary: dict, name: str) -> float:
-    """A figure that `Problem.limits` names; NaN where the summary has none."""
-    figures = summary["conservation"] | (summary["report"] or {})
-    value = figures.get(name)
-    return NONE if value is None else float(value)
+def _figure(summary: Summary, name: str) -> float:
+    """The figure that a limit of that name holds; NaN where the run has no such figure."""
+    value = figure(summary, name)
+    return NONE if value is None else value
 
 
 def _last(directory: Path) -> Checkpoint:
@@ -241,12 +234,8 @@ def _sizes(state: Checkpoint) -> dict[str, float]:
 
 
 def _closeness(value: float) -> float:
-    """`value` to compare by, with what is no number farthest."""
+    """`value` as a sort key: NaN counts as infinite."""
     return value if value == value else float("inf")
-
-
-def _cpu(summary: dict) -> float:
-    return summary["cost"]["cpu_seconds"] - summary["cost"]["session"]["compile_cpu_seconds"]
 
 
 def _positive(text: str, value: str, above: float) -> float:

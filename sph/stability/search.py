@@ -1,7 +1,7 @@
-"""Where a property ends along a positive number: outward in strides, then bisection.
+"""The end of a range of positive numbers in which a property holds: strides, then bisection.
 
-All is done in logarithms: C and eta are scales. Whether the property holds is asked of a function,
-several values at a time where that is no slower.
+Both work in the logarithm: C and eta are scales. A function tells whether the property holds, for
+several values at a time where they can run in parallel.
 """
 
 import math
@@ -15,25 +15,25 @@ Holds = Callable[[Sequence[float]], Sequence[bool]]
 
 
 class Stride(NamedTuple):
-    """How to look for an end: `factor` (below 1: downward) from value to value, how often."""
+    """How to search for an end: `factor` from value to value (below 1: downward), `most` times."""
 
     factor: float
     most: int
 
 
 class Edge(NamedTuple):
-    """The last value where the property holds and the next that was found where it does not."""
+    """The last value for which the property holds, and the next one for which it does not."""
 
-    inside: float | None  # None: it holds nowhere that was tried
-    outside: float | None  # None: it holds at all that were tried
+    inside: float | None  # None: it holds for no tried value
+    outside: float | None  # None: it holds for all tried values
 
 
 def find(holds: Holds, start: float, stride: Stride, resolution: float, at_once: int = 1) -> Edge:
-    """The end of the property that comes first on the way from `start`, where it may hold or not.
+    """The first end of the range on the way from `start`.
 
-    Where it does not, the end is looked for on the other side of `start`. inside and outside are
-    at most a factor of `resolution` apart, but for rounding. Where the property is not monotonic
-    this is one end of it, and values beyond may have it again.
+    Where the property does not hold at `start`, the search goes the other way. inside and outside
+    are at most a factor of `resolution` apart, but for rounding. Where the property is not
+    monotonic, this is one end of several: it may hold again beyond.
     """
     (is_inside,) = holds([start])
     factor = stride.factor if is_inside else 1.0 / stride.factor
@@ -47,7 +47,7 @@ def find(holds: Holds, start: float, stride: Stride, resolution: float, at_once:
 
 
 def rounded(value: float) -> float:
-    """`value` to the digits that are tried."""
+    """`value`, rounded to DIGITS."""
     return float(f"{value:.{DIGITS}g}")
 
 
@@ -65,7 +65,7 @@ def _walk(holds, verdict, start, stride, at_once) -> tuple[float, float | None]:
 
 
 def _between(inside: float, outside: float, resolution: float, count: int) -> list[float]:
-    """`count` values that part the way from inside to outside; none where it is short enough."""
+    """`count` values between inside and outside; none where they are close enough."""
     if max(inside / outside, outside / inside) <= resolution:
         return []
     part = math.log(outside / inside) / (count + 1)

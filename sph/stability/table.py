@@ -1,4 +1,4 @@
-"""What came of a search: words for the terminal, JSON and CSV."""
+"""The result of a search, as text, JSON and CSV."""
 
 import csv
 import io
@@ -18,7 +18,7 @@ COLUMNS = ("value", "verdict", "error_over_limit", "field", "energy_drift", "tim
 
 
 def in_words(found: Found) -> str:
-    """Where the ends are, how far the configuration is from them, and what happens there."""
+    """The ends of the stable range, the margin of the configuration, and what happens beyond."""
     lines = [
         f"{found.config}, {found.scheme}, {found.particles} particles, runs to t = {found.end:g}"
         f"{_what_was_not_run(found)}. A run is stable if {found.judge.in_words()}."
@@ -30,7 +30,7 @@ def in_words(found: Found) -> str:
             lines.append(_length(found, inside))
         if islands := found.islands(end):
             lines.append(
-                f"  It is not one range: stable again at {', '.join(f'{x:g}' for x in islands)}."
+                f"  The range has gaps: stable again at {', '.join(f'{x:g}' for x in islands)}."
             )
     return "\n".join(lines)
 
@@ -38,11 +38,11 @@ def in_words(found: Found) -> str:
 def _what_was_not_run(found: Found) -> str:
     if found.end >= found.whole_end:
         return ""
-    return f" of time.end = {found.whole_end:g}: the search says nothing of later times"
+    return f" of time.end = {found.whole_end:g}: later times were not tested"
 
 
 def _length(found: Found, value: float) -> str:
-    """How long the last stable run was, and whether that is enough."""
+    """The number of steps of the last stable run, and whether it suffices."""
     steps = found.at(value).steps
     said = f"  The run at {value:g} took {steps} steps"
     if steps >= FEW_STEPS:
@@ -53,13 +53,13 @@ def _length(found: Found, value: float) -> str:
 
 
 def margin(found: Found, end: str) -> float:
-    """The last stable value over the configuration's, NaN where there is none."""
+    """The last stable value over the configured one; NaN where no value is stable."""
     inside = found.edges[end].inside
     return math.nan if inside is None else inside / found.default
 
 
 def as_json(found: Found) -> str:
-    """Everything. NaN is null."""
+    """All of the result. NaN is null."""
     content = {
         "config": found.config,
         "problem": found.problem,
@@ -123,11 +123,10 @@ def _of_an_end(found: Found, end: str) -> str:
     side = "up" if end == "largest" else "down"
     if edge.inside is None:
         reason = found.at(found.default).reason
-        return f"{key}: nothing that was tried is stable; at {found.default:g} {reason}."
+        return f"{key}: no tried value is stable; at {found.default:g} {reason}."
     if edge.outside is None:
-        return (
-            f"{key}: stable {side} to {edge.inside:g}, {_ratio(found, end)}, as far as was tried."
-        )
+        reached = f"{key}: stable {side} to {edge.inside:g}, {_ratio(found, end)}"
+        return f"{reached}; the search ended there."
     trial = found.at(edge.outside)
     return (
         f"{key}: stable {side} to {edge.inside:g}, {_ratio(found, end)}; at {edge.outside:g} "
@@ -139,4 +138,4 @@ def _ratio(found: Found, end: str) -> str:
     ratio = margin(found, end)
     is_inside = ratio >= 1.0 if end == "largest" else ratio <= 1.0
     said = f"{ratio:.2g} times the configuration's {found.default:g}"
-    return said if is_inside else f"{said}, WHICH IS BEYOND"
+    return said if is_inside else f"{said}: THE CONFIGURATION IS UNSTABLE"

@@ -1,14 +1,14 @@
-"""Runs of one configuration at values of one key, in a directory that is a sweep's.
+"""Runs of one configuration at values of one key, in the directory of a sweep.
 
-Each is a run directory like any other, named after its value. One that has ended, well or not, is
-never run again; one that was killed goes on from its last checkpoint.
+Each run has a run directory, named after the value. A run that has ended, done or failed, is never
+repeated; a run that was killed continues from its last checkpoint.
 """
 
 from collections.abc import Sequence
 from pathlib import Path
 
 from sph import config as configuration
-from sph import standard_streams
+from sph import progress
 from sph.errors import ConfigError, FileError, NumericalError, Stopped, first_line
 from sph.stability.criterion import NONE, Criterion, Judge, Trial
 from sph.sweep import local
@@ -21,7 +21,7 @@ DEFAULT = "default"  # name of the run of the configuration as it is
 
 
 class Trials:
-    """Runs and judges trials of `key`; `done` holds those that were asked for, by value."""
+    """Runs and judges trials of `key`; `done` holds the trials so far, by value."""
 
     def __init__(
         self, config: Path, key: str, overrides: Sequence[str], directory: Path,
@@ -32,6 +32,7 @@ class Trials:
         self.config = configuration.load(config, overrides)
         self.sweep = SweepDirectory(directory.absolute())
         self.done: dict[float, Trial] = {}
+        self.shown = progress.suited_to_runs("trials", None)  # bisection decides how many
         courant = float(f"{self.config.physics.C * criterion.reference:.6g}")
         (task,) = self._run([self._point(COURANT, courant)])
         if task.status is None:
@@ -48,7 +49,7 @@ class Trials:
 
     @property
     def whole_end(self) -> float:
-        """time.end of the configuration file, which an override may have shortened."""
+        """time.end of the configuration file; an override may have shortened the runs."""
         others = [one for one in self.overrides if not one.startswith("time.end")]
         try:
             return configuration.load(self.path, others).time.end
@@ -56,16 +57,16 @@ class Trials:
             return self.config.time.end
 
     def are_stable(self, values: Sequence[float]) -> list[bool]:
-        """Whether runs at these values are, which are made where they are missing.
+        """Whether runs at these values are stable; runs that are missing are made.
 
-        Raises ConfigError where the directory is of another configuration, FileError, and Stopped
-        where a run was stopped.
+        Raises ConfigError where the directory holds runs of another configuration, FileError, and
+        Stopped where a run was stopped.
         """
         missing = [value for value in values if value not in self.done]
         found = self._run([self._point(self.key, value) for value in missing])
         for value, task in zip(missing, found, strict=True):
             self.done[value] = self._trial(value, task)
-            self._say(self.done[value])
+            self._told(self.done[value])
         return [self.done[value].is_stable for value in values]
 
     def _point(self, key: str, value: float) -> Point:
@@ -86,19 +87,19 @@ class Trials:
         self._refused = {}
         for outcome in outcomes:
             if outcome.status == "stopped":
-                raise Stopped(f"{outcome.name}: {outcome.reason}; the same command goes on.")
+                raise Stopped(f"{outcome.name}: {outcome.reason}; the same command continues.")
             if outcome.status == "failed" and outcome.code != NumericalError.exit_code:
                 raise FileError(f"{outcome.name} in {self.sweep.path}: {outcome.reason}")
             self._refused[outcome.name] = outcome.reason
         return found
 
     def _trial(self, value: float, task: Task) -> Trial:
-        if task.status is None:  # it said what is wrong before it made its first step
+        if task.status is None:  # it failed before its first step
             name = task.point.name
             reason = first_line(self._refused[name])
             return Trial(value, name, "failed", reason, NONE, "", NONE, 0.0, 0, 0.0)
         return self.judge.trial(value, task.run.path)
 
-    def _say(self, trial: Trial) -> None:
+    def _told(self, trial: Trial) -> None:
         reason = f": {trial.reason}" if trial.reason else ""
-        standard_streams.note(f"{self.key} = {trial.value:g}: {trial.verdict}{reason}")
+        self.shown.ended(f"{self.key} = {trial.value:g}: {trial.verdict}{reason}")

@@ -1,13 +1,13 @@
 """A case of the stress suite: a TOML file in `cases/` beside this one, found by its name.
 
-It is a configuration, as `sph run` takes it, with more beside:
+The file is a configuration, as `sph run` takes it, with further keys:
 
-    title, hard        what it is, and what is hard about it
-    [limits]           figure = { at_most, at_least, why }, see `figures`: what a right answer keeps
-    [reaches]          figure = { ideal, why }: how far SPH gets where it cannot get there
-    [settings.NAME]    about; set, keys as `--set` takes them; limits of its own, on top;
-                       fails = { limit | exit, because }: it is to fail, by that limit, or by
-                       ending with exit code 3 and these words
+    title, hard        what the case is, and what is hard about it
+    [limits]           figure = { at_most, at_least, why }, see `figures`: bounds on a right answer
+    [reaches]          figure = { ideal, why }: a figure for which SPH cannot reach the exact answer
+    [settings.NAME]    about; set: keys as `--set` takes them; limits: more bounds; fails =
+                       { limit | exit, because }: an expected failure, by breaking that limit, or
+                       with exit code 3 and these words
 """
 
 import fnmatch
@@ -25,11 +25,11 @@ from sph.errors import ConfigError, FileError
 from sph.problems.base import Section
 
 FOLDER = Path(__file__).parent / "cases"
-TABLES = ("problem", *SECTIONS)  # of the configuration in a case
+TABLES = ("problem", "physics", *SECTIONS)  # of the configuration in a case
 
 
 class Bound(Section):
-    """What a figure must keep, and where the number comes from."""
+    """Bounds of a figure, and where the numbers come from."""
 
     at_most: float | None = None
     at_least: float | None = None
@@ -42,21 +42,24 @@ class Bound(Section):
         return self
 
     def holds(self, value: float) -> bool:
-        """Whether `value` is within; NaN, a figure that is not there, never is."""
+        """Whether `value` is within the bounds; NaN, a missing figure, never is."""
         above = self.at_least is None or value >= self.at_least
         below = self.at_most is None or value <= self.at_most
         return above and below and value == value
 
     def closeness(self, value: float) -> float:
-        """How near `value` is to the bound, 1 on it and more beyond."""
+        """`value` relative to the bound: 1 on the bound, more beyond it."""
         if value != value:
             return float("inf")
         low, high = self.at_least, self.at_most
         if low is not None and high is not None:
             return abs(2.0 * value - (high + low)) / (high - low)
-        size, bound = (high, value) if low is None else (value, low)
         # a share means something where both are above zero
-        return bound / size if min(size, bound) > 0.0 else float(not self.holds(value))
+        if high is not None and min(high, value) > 0.0:
+            return value / high
+        if low is not None and min(low, value) > 0.0:
+            return low / value
+        return float(not self.holds(value))
 
     def __str__(self) -> str:
         low = "" if self.at_least is None else f"at least {self.at_least:g}"
@@ -64,24 +67,24 @@ class Bound(Section):
         return " and ".join(filter(None, (low, high)))
 
 
-# What every case keeps unless it gives a bound of its own for the figure, with its reason.
+# Bounds of every case, unless the case gives its own for the figure.
 ALWAYS = {
     "conservation.energy_drift_max": Bound(
         at_most=1e-3, why="the scheme conserves energy but for the error of the time integration"
     ),
-    "history.min_internal_energy.min": Bound(at_least=0.0, why="a gas has no negative heat"),
+    "history.min_internal_energy.min": Bound(at_least=0.0, why="internal energy is not negative"),
 }
 
 
 class Reach(Section):
-    """A figure in which SPH falls short of the exact answer."""
+    """A figure for which SPH cannot reach the exact answer."""
 
     ideal: float
     why: str = Field(min_length=1)
 
 
 class Failing(Section):
-    """How a setting is to fail: by breaking a limit, or by ending with these words."""
+    """An expected failure: the setting breaks a limit, or ends with these words."""
 
     limit: str | None = None
     exit: str | None = None
@@ -104,7 +107,7 @@ class Setting(Section):
 
 
 class Case(Section):
-    """A hard case: a configuration, what it must keep, and the settings to run it with."""
+    """A hard case: a configuration, its limits, and the settings to run it with."""
 
     name: str
     title: str = Field(min_length=1)
@@ -119,13 +122,15 @@ class Case(Section):
         for name, setting in self.settings.items():
             limit = setting.fails and setting.fails.limit
             if limit and limit not in self.bounds(name):
-                raise ValueError(f"settings.{name} is to fail by {limit}, which has no limit")
+                raise ValueError(
+                    f"settings.{name} is expected to break {limit}, which has no limit"
+                )
         if all(setting.fails for setting in self.settings.values()):
             raise ValueError("no setting is expected to pass")
         return self
 
     def bounds(self, setting: str) -> dict[str, Bound]:
-        """All limits of a setting by figure: its own before the case's before everyone's."""
+        """All limits of a setting, by figure: its own override the case's, and those ALWAYS."""
         return ALWAYS | self.limits | self.settings[setting].limits
 
     def to_toml(self) -> str:
@@ -134,7 +139,7 @@ class Case(Section):
 
 
 def read(path: Path) -> Case:
-    """The case in a file. Raises FileError where it is none."""
+    """The case in a file. Raises FileError where the file is not a valid case."""
     try:
         content = tomllib.loads(path.read_text(encoding="utf-8"))
         tables = {name: content.pop(name) for name in TABLES if name in content}
@@ -144,14 +149,14 @@ def read(path: Path) -> Case:
 
 
 def names() -> list[str]:
-    """Names of the cases there are."""
+    """Names of all cases."""
     return sorted(path.stem for path in FOLDER.glob("*.toml"))
 
 
 def load(only: Sequence[str] = ()) -> list[Case]:
-    """The cases of these names or patterns such as `noh_*`, all if none is given.
+    """The cases of these names, or patterns such as `noh_*`; all cases where none is given.
 
-    Raises ConfigError where there is no such case.
+    Raises ConfigError where no case matches.
     """
     there = names()
     chosen = set() if only else set(there)

@@ -1,14 +1,14 @@
 """The stress suite from its command line to its closing words.
 
-Each case is a sweep in a directory of its own, whose points are the case's settings: they share one
-pool of processes, and what is done is not done again.
+Each case is a sweep in a directory of its own; its points are the settings of the case. All points
+share one pool of processes. Runs that have ended are not repeated.
 """
 
 import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 
-from sph import standard_streams
+from sph import progress
 from sph.errors import FileError, Stopped
 from sph.output.files import explained, write_text
 from sph.stress import table
@@ -21,7 +21,7 @@ from sph.sweep.task import Outcome, Task, tasks
 
 
 class Suite:
-    """Cases in a directory, and the task of each of their settings."""
+    """Cases in a directory, and a task for each setting of each case."""
 
     def __init__(self, cases: Sequence[Case], directory: Path):
         self.cases = list(cases)
@@ -45,21 +45,24 @@ class Suite:
 def run(
     only: Sequence[str], directory: Path, jobs: int | None = None
 ) -> tuple[Suite, list[Result]]:
-    """Bring the cases of these names to their end and judge them; writes stress.json and .md.
+    """Run the cases of these names and judge them; writes stress.json and stress.md.
 
-    Raises ConfigError before anything runs, FileError also where a run could not write, and Stopped
-    where one was stopped.
+    Raises ConfigError before any run starts, FileError also where a run could not write a file, and
+    Stopped where a run was stopped.
     """
     suite = Suite(load(only), directory)
     missing = [task for _, _, task in suite.runs.values() if not _has_ended(task)]
     told = _Told(suite, len(missing))
-    local.run(missing, jobs, told)
+    try:
+        local.run(missing, jobs, told)
+    finally:
+        told.shown.close()
     if told.unwritten:
         raise FileError(told.unwritten)
     if told.stopped:
         raise Stopped(
-            f"{told.stopped} of {len(suite.runs)} runs have not ended; the same command goes on "
-            "with them."
+            f"{told.stopped} of {len(suite.runs)} runs have not ended; the same command continues "
+            "them."
         )
     results = suite.results()
     with explained(f"cannot write to {directory}"):
@@ -73,26 +76,18 @@ class _Told:
 
     def __init__(self, suite: Suite, missing: int):
         self.suite = suite
-        self.all = len(suite.runs)
-        self.ended = self.all - missing
+        self.shown = progress.suited_to_runs("runs", len(suite.runs), len(suite.runs) - missing)
         self.stopped = 0
-        self.unwritten = ""  # by which run, and why: no verdict on its method
-        if self.ended:
-            self._say(f"{self.ended} of {self.all} runs are done already")
+        self.unwritten = ""  # which run could not write, and why: that says nothing of its method
 
     def __call__(self, outcome: Outcome) -> None:
         if outcome.status == "stopped":
             self.stopped += 1
-            self._say(f"{outcome.name} stopped: {outcome.reason}")
+            self.shown.note(f"{outcome.name} stopped: {outcome.reason}")
             return
         if outcome.code == FileError.exit_code:
             self.unwritten = f"{outcome.name}: {outcome.reason}"
-        self.ended += 1
-        verdict = self.suite.result(outcome.name).verdict
-        self._say(f"[{self.ended:{len(str(self.all))}d}/{self.all}] {outcome.name}: {verdict}")
-
-    def _say(self, line: str) -> None:
-        standard_streams.note(line)
+        self.shown.ended(f"{outcome.name}: {self.suite.result(outcome.name).verdict}")
 
 
 def _point(case: Case, setting: str) -> Point:
@@ -107,5 +102,5 @@ def _prepare(sweep: SweepDirectory, case: Case, plan: Plan) -> None:
 
 
 def _has_ended(task: Task) -> bool:
-    """Whether a run is done or came to numbers that mean nothing, which is a result too."""
+    """Whether a run is done, or failed: a numerical failure is a result too."""
     return task.status in ("done", "failed")

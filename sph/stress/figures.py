@@ -1,19 +1,21 @@
-"""Figures of a run that limits are set on, each by a name of parts between dots.
+"""Figures of a run that limits may name; parts of a name stand between dots.
 
-errors.FIELD.NORM          as the summary has them: against the exact solution, where it holds
-relative.FIELD.NORM        the same, of (value - exact)/|exact| of each particle
-report.NAME                figures of the problem
+errors.FIELD.NORM          as in the summary: against the exact solution, where it holds
+relative.FIELD.NORM        norm of (value - exact)/|exact| of each particle
+report.NAME                figures of the problem, as in the summary
 nearest.KIND               distance to the nearest neighbour, in spacings; KIND is median, smallest
 conservation.NAME, cost.NAME, steps, particles, time
 history.COLUMN.KIND        over all steps; KIND is first, last, min or max
 state.FIELD.KIND           over the particles at the end; KIND is min or max
-warnings.KIND              how many warnings of that kind the run ended with
+warnings.KIND              1 where the run ended with a warning of that kind, else 0
 change.FIELD               largest |last - first| of a particle, over its own first value for
                            scalars, over the largest first length for vectors
 """
 
+from collections.abc import Callable, Mapping
 from functools import cached_property
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -24,6 +26,7 @@ from sph.output import checkpoint as checkpoints
 from sph.output.checkpoint import Checkpoint
 from sph.output.history import read as read_history
 from sph.output.run_directory import RunDirectory
+from sph.summary import Summary, lookup
 
 KINDS = (
     "errors", "relative", "report", "nearest", "conservation", "cost", "steps", "particles",
@@ -31,26 +34,31 @@ KINDS = (
 )  # fmt: skip
 NONE = float("nan")  # the value of a figure that a run does not have
 
-OF_HISTORY = {"first": lambda x: x[0], "last": lambda x: x[-1], "min": np.min, "max": np.max}
+OF_HISTORY: dict[str, Callable[[np.ndarray], Any]] = {
+    "first": lambda x: x[0],
+    "last": lambda x: x[-1],
+    "min": np.min,
+    "max": np.max,
+}
 OF_STATE = {"min": np.min, "max": np.max}
 
 
 class Figures:
-    """Figures of the run in a directory that has ended, each worked out when it is asked for."""
+    """Figures of the run in a directory, each computed when it is asked for."""
 
-    def __init__(self, directory: Path, summary: dict):
+    def __init__(self, directory: Path, summary: Summary | None):
         self.run = RunDirectory(directory)
-        self.summary = summary
+        self.summary: Mapping[str, Any] = summary or {}
 
     def value(self, name: str) -> float:
-        """The figure of that name, NaN where this run has none. Raises FileError."""
+        """The figure of that name; NaN where the run has no such figure. Raises FileError."""
         kind, *rest = name.split(".")
-        makers = {
+        makers: dict[str, Callable[..., Any]] = {
             "errors": self._error, "relative": self._relative, "history": self._of_history,
             "state": self._of_state, "change": self._change, "warnings": self._warnings,
         }  # fmt: skip
         try:
-            return float(makers[kind](*rest) if kind in makers else self._said(kind, *rest))
+            return float(makers[kind](*rest) if kind in makers else lookup(self.summary, name))
         except (KeyError, AttributeError, IndexError, TypeError, ValueError):
             return NONE
 
@@ -66,17 +74,11 @@ class Figures:
     def _last(self) -> Checkpoint:
         return checkpoints.read(self.run.checkpoints()[-1])
 
-    def _said(self, *names: str):
-        found = self.summary
-        for name in names:
-            found = found[name]
-        return found
-
     def _warnings(self, kind: str):
         return warnings.kinds(self.summary).count(kind)
 
     def _error(self, field: str, norm: str):
-        return self._said("errors", "fields", field, norm)
+        return lookup(self.summary, f"errors.fields.{field}.{norm}")
 
     def _of_history(self, column: str, kind: str):
         values = self._history[column]
@@ -95,12 +97,12 @@ class Figures:
         problem, position = state.config.problem, state.particles.position
         if truth.left_out(state.config, state.time, position):
             return NONE
-        exact = problem.exact(eos, state.time, position)[field]
+        exact = (problem.exact(eos, state.time, position) or {})[field]
         inside, _ = truth.region(problem, eos, state.time, position)
         with np.errstate(divide="ignore", invalid="ignore"):
             difference = (state.field(field) - exact) / np.abs(_length(exact))
         volume = state.particles.mass / state.particles.density
-        return norms(difference[..., inside], volume[inside])[norm]
+        return lookup(norms(difference[..., inside], volume[inside]), norm)
 
 
 def _length(values: np.ndarray) -> np.ndarray:

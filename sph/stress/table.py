@@ -1,4 +1,4 @@
-"""What came of the suite: a table and words for the terminal, Markdown and JSON."""
+"""The results of the suite: a table and sentences, as plain text, Markdown and JSON."""
 
 import math
 from collections.abc import Sequence
@@ -11,11 +11,11 @@ HEADER = (
     "case", "setting", "scheme", "verdict", "worst error", "energy drift", "lowest u",
     "lowest rho", "steps", "smallest dt", "CPU s",
 )  # fmt: skip
-WORDS = 5  # the first columns are words, set to the left
+WORDS = 5  # the first columns hold words and are aligned left
 
 
 def as_text(results: Sequence[Result]) -> str:
-    """Columns in line, for a terminal."""
+    """The table with aligned columns, for a terminal."""
     lines = [HEADER, *map(_cells, results)]
     widths = [max(map(len, column)) for column in zip(*lines, strict=True)]
     return "\n".join(
@@ -28,7 +28,7 @@ def as_text(results: Sequence[Result]) -> str:
 
 
 def as_markdown(cases: Sequence[Case], results: Sequence[Result]) -> str:
-    """The table and the words."""
+    """The table and the sentences."""
     rule = [":---"] * WORDS + ["---:"] * (len(HEADER) - WORDS)
     rows = ["| " + " | ".join(line) + " |" for line in (HEADER, rule, *map(_cells, results))]
     said = [f"- {sentence}" for sentence in sentences(cases, results)]
@@ -36,7 +36,7 @@ def as_markdown(cases: Sequence[Case], results: Sequence[Result]) -> str:
 
 
 def as_json(cases: Sequence[Case], results: Sequence[Result]) -> str:
-    """Everything: the cases with their limits' reasons, and the results. NaN is null."""
+    """The cases with the reasons of their limits, and the results. NaN is null."""
     content = {
         "words": closing(results),
         "cases": [
@@ -54,9 +54,9 @@ def as_json(cases: Sequence[Case], results: Sequence[Result]) -> str:
 
 
 def sentences(cases: Sequence[Case], results: Sequence[Result]) -> list[str]:
-    """Why settings fail, and how far the cases get that SPH cannot do."""
+    """Why settings fail, and how close SPH comes where it cannot reach the exact answer."""
     said = [
-        f"{result.name} {result.verdict}: {result.reason}."
+        f"{result.name}, {result.verdict}: {result.reason}."
         for result in results
         if result.verdict != PASS
     ]
@@ -69,24 +69,24 @@ def sentences(cases: Sequence[Case], results: Sequence[Result]) -> list[str]:
             ]
             if values:
                 said.append(
-                    f"{case.name} reaches {name} = {', '.join(values)}, where {reach.ideal:g} "
-                    f"would be right: {reach.why}."
+                    f"{case.name} reaches {name} = {', '.join(values)}; exact: {reach.ideal:g}. "
+                    f"Reason: {reach.why}."
                 )
     return said
 
 
 def closing(results: Sequence[Result]) -> str:
-    """How many cases pass, and which fall short."""
+    """The number of cases that pass, and the names of the others."""
     names = list(dict.fromkeys(result.case for result in results))
     short = [name for name in names if not _passes(_of(name, results))]
     seconds = sum(result.numbers.get("cpu_seconds", 0.0) for result in results)
     caught = sum(result.verdict != PASS and result.is_expected for result in results)
     said = (
-        f"{len(names) - len(short)} of {len(names)} cases pass; {caught} settings that are to "
-        f"fail were caught; {seconds:.0f} CPU seconds."
+        f"{len(names) - len(short)} of {len(names)} cases pass; {caught} expected failures; "
+        f"{seconds:.0f} CPU seconds."
     )
     if short:
-        said += f" Short: {', '.join(_why_short(name, results) for name in short)}."
+        said += f" Not passed: {', '.join(_why_short(name, results) for name in short)}."
     return said
 
 
@@ -96,7 +96,7 @@ def is_passed(results: Sequence[Result]) -> bool:
 
 
 def _passes(results: Sequence[Result]) -> bool:
-    """A case passes where all settings end as expected and one of them passes."""
+    """Whether a case passes: all of its settings end as expected, and one or more pass."""
     passing = any(result.verdict == PASS for result in results)
     return passing and all(result.is_expected for result in results)
 

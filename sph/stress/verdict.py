@@ -1,6 +1,7 @@
-"""Judge the runs of a case: what passes, what falls short, what fails as its file says."""
+"""Judge the runs of a case: passes, failures, and the failures that its file expects."""
 
 from dataclasses import dataclass
+from typing import Any
 
 from sph.analysis.report.runs import Row
 from sph.analysis.report.runs import read as read_runs
@@ -11,14 +12,14 @@ from sph.sweep.task import Task, standing
 
 PASS = "pass"
 SHORT = "falls short"
-AS_WRITTEN = "fails as written"
-OTHERWISE = "fails otherwise than written"
-UNEXPECTED = "passes, though written to fail"
+EXPECTED_FAILURE = "expected failure"
+UNEXPECTED_FAILURE = "unexpected failure"  # not in the way that the case file expects
+UNEXPECTED_PASS = "unexpected pass"
 
 
 @dataclass(frozen=True)
 class Check:
-    """A figure beside what it must keep."""
+    """A figure and the bound that it must keep."""
 
     figure: str
     value: float
@@ -29,7 +30,7 @@ class Check:
         return self.bound.holds(self.value)
 
     def __str__(self) -> str:
-        value = "is not there" if self.value != self.value else f"is {self.value:.3g}"
+        value = "is missing" if self.value != self.value else f"is {self.value:.3g}"
         return f"{self.figure} {value}, expected {self.bound}"
 
 
@@ -43,7 +44,7 @@ class Result:
     reason: str  # in words; empty for a pass
     checks: tuple[Check, ...]
     reaches: dict[str, float]
-    numbers: dict[str, float | int | str]
+    numbers: dict[str, Any]
 
     @property
     def name(self) -> str:
@@ -51,13 +52,14 @@ class Result:
 
     @property
     def is_expected(self) -> bool:
-        return self.verdict in (PASS, AS_WRITTEN)
+        return self.verdict in (PASS, EXPECTED_FAILURE)
 
     @property
     def worst(self) -> Check | None:
-        """The check that is broken or nearest to it; those of every case have columns of their own.
+        """The check that fails, or comes nearest to failing.
 
-        An error that must stay below a bound goes before what a run must at least have.
+        Checks of every case are left out: the table has columns for them. An error that must stay
+        below a bound goes before a figure that must exceed one.
         """
         own = [check for check in self.checks if check.figure not in ALWAYS]
         return max(own, key=_badness, default=None)
@@ -69,9 +71,9 @@ def _badness(check: Check) -> tuple[bool, bool, float]:
 
 
 def judge(case: Case, setting: str, task: Task) -> Result:
-    """The result of a run that has ended, by its files. Raises FileError."""
+    """The result of a run that has ended, from its files. Raises FileError."""
     (row,) = read_runs([task.run.path]) if task.status else (None,)
-    figures = Figures(task.run.path, row.summary if row else {})
+    figures = Figures(task.run.path, row.summary if row else None)
     checks = tuple(
         Check(name, figures.value(name) if row else NONE, bound)
         for name, bound in case.bounds(setting).items()
@@ -83,18 +85,18 @@ def judge(case: Case, setting: str, task: Task) -> Result:
 
 
 def _verdict(fails: Failing | None, checks: tuple[Check, ...], ended: str) -> tuple[str, str]:
-    """The verdict and its reason; `ended`: why the run ended early, empty where it did not."""
+    """The verdict and its reason. ended: why the run ended early; empty where it did not."""
     found = first_line(ended) or "; ".join(str(check) for check in checks if not check.holds)
     if fails is None:
         return (SHORT, found) if found else (PASS, "")
     if not found:
-        return UNEXPECTED, f"it was to fail because {fails.because}"
+        return UNEXPECTED_PASS, f"expected to fail, because {fails.because}"
     broken = {check.figure for check in checks if not check.holds}
     by_exit = fails.exit is not None and fails.exit in ended
     by_limit = fails.limit in broken and not ended
     if by_exit or by_limit:
-        return AS_WRITTEN, f"fails because {fails.because} ({found})"
-    return OTHERWISE, f"{found}; it was to fail because {fails.because}"
+        return EXPECTED_FAILURE, f"{fails.because} ({found})"
+    return UNEXPECTED_FAILURE, f"{found}; expected to fail because {fails.because}"
 
 
 def _numbers(row: Row | None, figures: Figures) -> dict:
@@ -109,6 +111,5 @@ def _numbers(row: Row | None, figures: Figures) -> dict:
         "lowest_density": figures.value("history.min_density.min"),
         "steps": row.steps,
         "smallest_step": figures.value("history.dt.min"),
-        # the history of a run that failed ends before its last step, which may have compiled
-        "cpu_seconds": max(0.0, row.cost["cpu"]),
+        "cpu_seconds": row.cost["cpu"],
     }

@@ -1,4 +1,4 @@
-"""A sweep from its command line to its closing words."""
+"""A sweep, from the command line to its closing words."""
 
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -10,7 +10,7 @@ from sph.sweep.manifest import SweepDirectory
 from sph.sweep.plan import Plan
 from sph.sweep.task import Outcome, Task, tasks
 
-ASKED_ABOVE = 1000  # points, from which on a slip of the keyboard is likely
+ASKED_ABOVE = 1000  # points: more are probably a typing error
 MARKS = {"done": "done", "failed": "FAILED", "stopped": "stopped"}
 
 
@@ -24,19 +24,19 @@ def run(
     slurm_options: Sequence[str] = (),
     is_sure: bool = False,
 ) -> str:
-    """Bring all points of a sweep to their end; returns the closing words.
+    """Run all points of a sweep that have not ended; returns the closing words.
 
-    Raises ConfigError and FileError before anything runs, ConfigError also for more than
-    ASKED_ABOVE points unless the user `is_sure`; NumericalError where a point failed and
-    Stopped where one was stopped, after all others have run.
+    Raises ConfigError and FileError before any point runs, ConfigError also for more than
+    ASKED_ABOVE points unless the user `is_sure`. After all points have run, raises NumericalError
+    where a point failed, and Stopped where a point was stopped.
     """
     if scheduler and slurm_options:
-        raise ConfigError("--scheduler and --slurm: a sweep runs at one of the two")
+        raise ConfigError("--scheduler and --slurm: give only one of the two")
     plan = Plan.of(varies, overrides)
     points = len(plan.points)
     if points > ASKED_ABOVE and not is_sure:
         raise ConfigError(
-            f"--vary: these are {points:,} points.\nTry: fewer values, or --yes to run them all."
+            f"--vary: the sweep has {points:,} points.\nTry: fewer values, or --yes to run them."
         )
     standard_streams.note(f"{points} {'point' if points == 1 else 'points'} to check and run")
     sweep = SweepDirectory(directory.absolute())
@@ -65,22 +65,15 @@ class _Told:
     def __init__(self, points: int, before: int):
         self.points, self.before = points, before
         self.outcomes: list[Outcome] = []
-        self.shown = progress.suited_to_points(points, before)
-        if before:
-            self.shown.note(f"{before} of {points} points are done already")
+        self.shown = progress.suited_to_runs("points", points, before)
 
     def __call__(self, outcome: Outcome) -> None:
         self.outcomes.append(outcome)
-        ended = self.before + len(self.outcomes)
         how = ", restarted from its last checkpoint" if outcome.how == "restart" else ""
         reason = f": {outcome.reason}" if outcome.reason else ""
         status = MARKS[outcome.status]
-        width = len(str(self.points))
         warned = f", with warnings: {', '.join(outcome.warnings)}" if outcome.warnings else ""
-        self.shown.note(
-            f"[{ended:{width}d}/{self.points}] {outcome.name} {status}{how}{warned}{reason}"
-        )
-        self.shown.ended(ended)
+        self.shown.ended(f"{outcome.name} {status}{how}{warned}{reason}")
 
     def closing(self) -> str:
         """Raises NumericalError or Stopped where not all points are done."""
@@ -90,7 +83,7 @@ class _Told:
             reasons = "".join(f"\n  {one.name}: {_first_line(one)}" for one in lists["failed"])
             raise NumericalError(f"{done}, {len(lists['failed'])} failed:{reasons}")
         if lists["stopped"]:
-            raise Stopped(f"{done}; the same command goes on with the rest.")
+            raise Stopped(f"{done}; the same command continues with the rest.")
         return f"{done}{self._warned()}."
 
     def _warned(self) -> str:

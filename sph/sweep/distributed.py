@@ -1,6 +1,6 @@
-"""Points on the workers of a Dask scheduler, which see the same files under the same path.
+"""Run points on the workers of a Dask scheduler; workers see the same files under the same path.
 
-A worker runs a point in a process of its own, as this machine would, one for each of its threads.
+A worker runs each point in a process of its own, one process for each thread of the worker.
 """
 
 import time
@@ -13,13 +13,13 @@ from sph.sweep.local import share_threads
 from sph.sweep.task import Outcome, Task, execute
 
 CONNECT_SECONDS = 10
-CHECK_SECONDS = 1.0  # between two looks whether the user wants to stop
+CHECK_SECONDS = 1.0  # between two checks whether the user asked to stop
 
 
 def run(tasks: Sequence[Task], address: str, tell: Callable[[Outcome], None]) -> None:
-    """Run every task on the scheduler at `address`; `tell` hears of each.
+    """Run every task on the scheduler at `address`; `tell` is called with each outcome.
 
-    A point has one thread, where run.threads is not given. Ctrl-C stops all as on this machine.
+    A point has one thread, unless run.threads is given. Ctrl-C stops all points.
     Raises ConfigError where Dask is not installed, FileError where no scheduler answers.
     """
     distributed = _distributed()
@@ -45,7 +45,7 @@ def _on_worker(task: Task, event: str) -> Outcome:
 
     def stops() -> int:
         nonlocal asked, last
-        if time.monotonic() - last > CHECK_SECONDS:  # each look is a question to the scheduler
+        if time.monotonic() - last > CHECK_SECONDS:  # each check is a request to the scheduler
             asked, last = int(stop.is_set()), time.monotonic()
         return asked
 
@@ -53,7 +53,7 @@ def _on_worker(task: Task, event: str) -> Outcome:
 
 
 def _outcome(future, name: str) -> Outcome:
-    """Of a task that ended, or whose worker did."""
+    """The outcome of a task that ended, or whose worker was lost."""
     if future.status == "finished":
         return future.result()
     reason = future.exception() if future.status == "error" else future.status

@@ -1,4 +1,4 @@
-"""Points on this machine: a few processes at a time, which share its processors."""
+"""Run points on this machine: a few processes at a time, which share its processors."""
 
 import signal
 from collections.abc import Callable, Sequence
@@ -11,10 +11,10 @@ from sph.threads import available_processors
 
 
 def run(tasks: Sequence[Task], jobs: int | None, tell: Callable[[Outcome], None]) -> None:
-    """Run every task, `jobs` at once (as many as processors if None); `tell` hears of each.
+    """Run every task, `jobs` at once (None: the number of processors); calls `tell` with outcomes.
 
-    The first SIGINT or SIGTERM lets runs that have begun write a checkpoint and begins no more;
-    a second one ends them at once and raises KeyboardInterrupt.
+    After a first SIGINT or SIGTERM, runs write a checkpoint and end, and no further run starts. A
+    second signal ends all runs at once and raises KeyboardInterrupt.
     """
     processors = available_processors()
     jobs = min(jobs or processors, len(tasks)) or 1
@@ -36,5 +36,5 @@ def run(tasks: Sequence[Task], jobs: int | None, tell: Callable[[Outcome], None]
 
 
 def share_threads(tasks: Sequence[Task], threads: int) -> list[Task]:
-    """The tasks with `threads` each, where the user did not give run.threads."""
+    """The tasks with `threads` threads each, unless the user gave run.threads."""
     return [task if chooses_threads(task) else replace(task, threads=threads) for task in tasks]

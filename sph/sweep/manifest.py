@@ -1,11 +1,11 @@
-"""The directory of a sweep: what it is of, and the runs in it.
+"""The directory of a sweep: its configuration, its points, and their runs.
 
-    base.toml    the configuration as it was given
-    sweep.toml   what was set and varied, and the points by name
-    logs/        a log for each point, and the reason why its last attempt failed
+    base.toml    the configuration, as the user gave it
+    sweep.toml   the keys that are set and varied, and the points by name
+    logs/        a log for each point, and the reason of its last failure
     <point>/     a run directory
 
-What has been done is not written here: each run directory tells that itself.
+Neither file says which points have ended: the run directories do.
 """
 
 import tomllib
@@ -55,7 +55,7 @@ class SweepDirectory:
         return self.manifest.is_file()
 
     def plan(self) -> Plan:
-        """The plan in sweep.toml. Raises FileError where there is none that can be read."""
+        """The plan in sweep.toml. Raises FileError where it cannot be read."""
         try:
             found = tomllib.loads(read_text(self.manifest))
             points = tuple(Point(name, _texts(one)) for name, one in found["points"].items())
@@ -69,10 +69,11 @@ class SweepDirectory:
             ) from None
 
     def prepare(self, config: Path, plan: Plan) -> None:
-        """Make this the directory of that sweep, or check that it is and note added points.
+        """Create the directory of that sweep; in an existing one, check the plan and add points.
 
-        Raises ConfigError where a point is wrong, or is not what this directory has under its
-        name; FileError where it holds other things or cannot be written. Then nothing is changed.
+        Raises ConfigError where a point is invalid, or its configuration differs from the one in
+        this directory; FileError where the directory holds other files or cannot be written. In
+        these cases nothing is changed.
         """
         resolved = plan.resolved(config)
         with explained(f"cannot write to {self.path}"):
@@ -88,12 +89,12 @@ class SweepDirectory:
         write_text(self.manifest, _text(plan))
 
     def failures(self) -> dict[str, str]:
-        """Reasons of points whose last attempt failed, by name."""
+        """Why the last attempt of a point failed, by name of the point."""
         found = sorted(self.logs.glob("*.failed"))
         return {path.stem: reason_in(path) for path in found}
 
     def _extended(self, plan: Plan, resolved: dict[str, Config]) -> Plan:
-        """The plan that is here and what the new one adds. Raises ConfigError if they differ."""
+        """The plan of this directory with the points that `plan` adds. Raises ConfigError."""
         before = self.plan()
         if list(before.varied) != list(plan.varied):
             raise ConfigError(
@@ -121,7 +122,7 @@ class SweepDirectory:
                 _refuse_change(f"{run.path} holds a run", there, config)
 
     def _refuse_other_things(self, base: str) -> None:
-        """Raise FileError where the directory holds more than what a sweep killed here left."""
+        """Raise FileError where the directory holds other files than those of a killed sweep."""
         there = set()
         if self.path.is_dir():
             there = {one for one in self.path.iterdir() if not is_unfinished(one.name)}
@@ -131,13 +132,13 @@ class SweepDirectory:
         )
         if not self.path.is_dir() or there - logs - ours:
             raise FileError(
-                f"{self.path} is there already, and is not the directory of a sweep.\n"
+                f"{self.path} exists already and is not the directory of a sweep.\n"
                 f"{OTHER_DIRECTORY}"
             )
 
 
 def reason_in(path: Path) -> str:
-    """What a `.failed` file says, whatever it holds."""
+    """The reason in a `.failed` file; never raises."""
     try:
         with opened(path) as file:
             return file.readall().decode(errors="replace").strip() or "no reason was kept"
@@ -148,7 +149,7 @@ def reason_in(path: Path) -> str:
 
 
 def has_checkpoints(run: RunDirectory) -> bool:
-    """Whether there is a run directory with a checkpoint, good or not."""
+    """Whether the run directory exists and holds a checkpoint, damaged or not."""
     try:
         return bool(run.checkpoints())
     except FileNotFoundError:
@@ -156,7 +157,7 @@ def has_checkpoints(run: RunDirectory) -> bool:
 
 
 def _refuse_change(what: str, there: Config | None, now: Config) -> None:
-    """Raise ConfigError, with the keys that differ. How a run is carried out may differ."""
+    """Raise ConfigError with the keys that differ, but for the table [run]."""
     if there is not None and there.to_toml(include_run=False) == now.to_toml(include_run=False):
         return
     differences = [] if there is None else _differences(there, now)
@@ -176,7 +177,7 @@ def _differences(there: Config, now: Config) -> list[str]:
 
 
 def _texts(values) -> tuple[str, ...]:
-    """A list of texts. Raises TypeError for anything else."""
+    """A list of strings, as a tuple. Raises TypeError for anything else."""
     if not isinstance(values, list) or not all(isinstance(one, str) for one in values):
         raise TypeError
     return tuple(values)
@@ -197,5 +198,5 @@ def _text(plan: Plan) -> str:
 
 
 def _union(before, after):
-    """What is in `before`, then what only `after` has; of the same type."""
+    """The items of `before`, then those that only `after` has; in the type of `before`."""
     return type(before)([*before, *(one for one in after if one not in before)])

@@ -1,4 +1,4 @@
-"""What a sweep runs: `--vary` read, ranges written out, and their product."""
+"""The plan of a sweep: reads `--vary`, expands ranges, and forms their product."""
 
 import hashlib
 import itertools
@@ -17,10 +17,10 @@ _NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
 _RANGE = re.compile(rf"({_NUMBER}):({_NUMBER}):(x|\+|-)([\d.].*)", re.ASCII | re.DOTALL)
 RANGE_FORM = "FIRST:LAST:xFACTOR, FIRST:LAST:+STEP or FIRST:LAST:-STEP"
 
-# A last value within this share of a step is met, as 2 is by 1:2:x1.414214.
+# A last value within this fraction of a step counts, as 2 does in 1:2:x1.414214.
 ROUNDING = Decimal("1e-6")
 DIGITS = 12  # of a value of a geometric range: as many as powers of a rounded factor can claim
-MOST_VALUES = 10_000  # of one key: more is a slip of the keyboard
+MOST_VALUES = 10_000  # of one key: more are probably a typing error
 MOST_POINTS = 100_000  # directories in one directory, and configurations in memory
 
 # File systems take 255 bytes; a name must also be readable in a table.
@@ -53,7 +53,7 @@ class Plan:
                 raise ConfigError(f"--vary {text}: {key} is varied already; give all its values")
             varied[key] = values
         if (points := math.prod(map(len, varied.values()))) > MOST_POINTS:
-            raise ConfigError(f"--vary: these are {points:,} points; at most {MOST_POINTS:,} go")
+            raise ConfigError(f"--vary: {points:,} points; expected at most {MOST_POINTS:,}")
         _refuse_set_and_varied(overrides, varied)
         return cls(tuple(overrides), varied, _points(varied))
 
@@ -62,7 +62,8 @@ class Plan:
 
         Raises FileError for `config`, and ConfigError with all that is wrong with any point.
         """
-        found, wrong = {}, {}
+        found: dict[str, configuration.Config] = {}
+        wrong: dict[str, list[str]] = {}
         for point in self.points:
             try:
                 overrides = (*self.overrides, *point.settings)
@@ -77,7 +78,7 @@ class Plan:
         return found
 
     def _told(self, line: str, names: list[str]) -> str:
-        """A thing that is wrong and, where it is not so for all, for which points."""
+        """An error and, unless all points have it, the points that do."""
         if len(names) == len(self.points) or "--vary" in line:
             return line
         more = f" and {len(names) - 1} more" if len(names) > 1 else ""
@@ -94,7 +95,7 @@ def _varied(text: str) -> tuple[str, list[str]]:
         raise ConfigError(f"--vary {text}: a value is empty; expected VALUE,VALUE,…")
     twice = [value for value, count in Counter(found).items() if count > 1]
     if twice:
-        raise ConfigError(f"--vary {text}: {twice[0]} stands there twice")
+        raise ConfigError(f"--vary {text}: {twice[0]} is given twice")
     return key, found
 
 
@@ -177,23 +178,23 @@ def _number(text: str, number: str) -> Decimal:
 
 def _geometric(text: str, first: Decimal, last: Decimal, factor: Decimal) -> list[Decimal]:
     if min(first, last, factor) <= 0 or factor == 1:
-        raise ConfigError(f"{text}: a factor other than 1 and ends above 0 are expected")
+        raise ConfigError(f"{text}: expected a factor other than 1, and ends above 0")
     steps = _steps(text, (last.ln() - first.ln()) / factor.ln())
     return [Decimal(f"{first * factor**k:.{DIGITS}g}") for k in range(steps + 1)]
 
 
 def _arithmetic(text: str, first: Decimal, last: Decimal, step: Decimal) -> list[Decimal]:
     if step == 0:
-        raise ConfigError(f"{text}: a step of 0 leads nowhere")
+        raise ConfigError(f"{text}: expected a step other than 0")
     return [first + k * step for k in range(_steps(text, (last - first) / step) + 1)]
 
 
 def _steps(text: str, ratio: Decimal) -> int:
     """Whole steps from the first to the last value."""
     if ratio < -ROUNDING:
-        raise ConfigError(f"{text}: this leads away from the last value; expected {RANGE_FORM}")
+        raise ConfigError(f"{text}: steps lead away from the last value; expected {RANGE_FORM}")
     if ratio > MOST_VALUES - 1:
-        raise ConfigError(f"{text}: these are more than {MOST_VALUES:,} values")
+        raise ConfigError(f"{text}: more than {MOST_VALUES:,} values")
     return math.floor(ratio + ROUNDING)
 
 

@@ -1,7 +1,7 @@
-"""Points as jobs of a Slurm cluster, submitted by submitit, on a file system that all nodes see.
+"""Run points as jobs of a Slurm cluster, by submitit, on a file system that all nodes share.
 
-Shortly before a job's time limit its run writes a checkpoint, and the job is queued again; it then
-goes on by `sph restart`.
+Shortly before the time limit of a job, its run writes a checkpoint and the job is queued again; the
+new job continues by `sph restart`.
 """
 
 import threading
@@ -14,15 +14,15 @@ from sph.stop_signals import stop_signals
 from sph.sweep.local import share_threads
 from sph.sweep.task import POLL, Outcome, Task, execute, standing
 
-CHECK_SECONDS = 1.0  # between two looks at the jobs
-# A point may take as many limits as it needs.
+CHECK_SECONDS = 1.0  # between two checks of the jobs
+# A point may reach its time limit any number of times.
 MOST_TIMEOUTS = 10_000
-# Options of submitit for every cluster; others are Slurm's own and take its prefix.
+# Options of submitit for every cluster; all others are options of Slurm, with its prefix.
 GENERIC = ("name", "timeout_min", "mem_gb", "nodes", "cpus_per_task")
 
 
 class Job:
-    """The callable that submitit runs in a job, and asks to checkpoint before its limit."""
+    """The callable that submitit runs in a job; submitit calls `checkpoint` before the limit."""
 
     def __init__(self):
         self.stops = 0
@@ -37,7 +37,7 @@ class Job:
             self.stops += 1
 
     def checkpoint(self, task: Task):
-        """Called at the limit: stop the run with a checkpoint; what is to be submitted next."""
+        """Stop the run with a checkpoint; returns the submission that continues it."""
         from submitit.helpers import DelayedSubmission
 
         self.stops += 1
@@ -55,11 +55,11 @@ def run(
     jobs: int | None,
     tell: Callable[[Outcome], None],
 ) -> None:
-    """Submit every task, at most `jobs` to run at once, and wait; `tell` hears of each.
+    """Submit every task, at most `jobs` at once, and wait; `tell` is called with each outcome.
 
-    options: `KEY=VALUE` of submitit, e.g. timeout_min=60, cpus_per_task=4, partition=short, and
-    cluster=local to try it without Slurm. A point has cpus_per_task threads, where run.threads is
-    not given. Ctrl-C cancels the jobs; their runs write a checkpoint. Raises ConfigError.
+    options: `KEY=VALUE` of submitit, e.g. timeout_min=60, cpus_per_task=4, partition=short;
+    cluster=local runs without Slurm. A point has cpus_per_task threads, unless run.threads is
+    given. Ctrl-C cancels the jobs; their runs write a checkpoint. Raises ConfigError.
     """
     if not tasks:
         return

@@ -1,8 +1,8 @@
-"""One point of a sweep, wherever it runs: look what its directory has, and do what is missing.
+"""One point of a sweep, on any machine: looks into its directory and does what is missing.
 
-A point is run by `sph run` or `sph restart` in a process of its own. That process writes to the
-point's log and holds, through it, the lock on the log: it goes with the process, however that ends.
-So an orphan of a sweep that was killed goes on unharmed, and nobody else touches its directory.
+A point is run by `sph run` or `sph restart` in a process of its own. That process writes to the log
+of the point and holds a lock on it, which the system releases when the process ends. A process that
+outlives a killed sweep therefore continues, and no other process touches its directory.
 """
 
 import fcntl
@@ -24,23 +24,23 @@ from sph.output.run_directory import RunDirectory
 from sph.sweep.manifest import SweepDirectory, has_checkpoints, reason_in
 from sph.sweep.plan import Plan, Point
 
-POLL = 0.1  # seconds between two looks at a lock, a child or a wish to stop
+POLL = 0.1  # seconds between two checks of a lock, a child process or a stop signal
 
 
 class Outcome(NamedTuple):
-    """How a point stands after an attempt."""
+    """The state of a point after an attempt."""
 
     name: str
-    status: str  # "done", "failed" or "stopped": it has not ended, and goes on in the next sweep
+    status: str  # "done", "failed", or "stopped": not ended, the next sweep continues it
     reason: str = ""
-    how: str = ""  # "run" or "restart" in this attempt; empty where nothing was done
+    how: str = ""  # "run" or "restart" in this attempt; empty where the point had ended
     code: int = 0  # exit code of this attempt
     warnings: tuple[str, ...] = ()  # the kinds of warning that a done point ended with
 
 
 @dataclass(frozen=True)
 class Task:
-    """All that another machine needs to run a point, given the same files."""
+    """What another machine needs to run a point, given the same files."""
 
     sweep: SweepDirectory
     point: Point
@@ -57,16 +57,16 @@ class Task:
 
     @property
     def failure(self) -> Path:
-        """Where the reason stands if the last attempt failed."""
+        """The file with the reason, if the last attempt failed."""
         return self.sweep.logs / f"{self.point.name}.failed"
 
     @property
     def status(self) -> str | None:
-        """The status in summary.json, or None while there is none."""
+        """The status in summary.json; None without that file."""
         return self.run.read_summary().get("status")
 
     def command(self) -> list[str]:
-        """What does the rest of this point: go on from the last good checkpoint, or run anew."""
+        """The command that completes this point: a restart, or a run from the initial state."""
         program = [sys.executable, "-m", "sph.cli"]
         threads = [] if self.threads is None else ["--threads", str(self.threads)]
         if self.status != "failed" and _can_go_on(self.run):
@@ -77,7 +77,7 @@ class Task:
 
 
 def tasks(sweep: SweepDirectory, plan: Plan) -> list[Task]:
-    """A task for each point, done or not; threads are not shared out yet."""
+    """A task for each point, ended or not; `share_threads` sets their threads."""
     return [Task(sweep, point, plan.overrides) for point in plan.points]
 
 
@@ -87,14 +87,16 @@ def chooses_threads(task: Task) -> bool:
 
 
 def execute(task: Task, stops: Callable[[], int] = lambda: 0) -> Outcome:
-    """Bring a point to its end, once nobody else is at it; the outcome tells of all errors.
+    """Run a point to its end, as soon as no other process runs it; errors are in the outcome.
 
-    stops(): how often a stop has been asked for. At the first the run writes a checkpoint and
-    ends, at a second it ends at once.
+    stops(): the number of stop signals so far. After the first, the run writes a checkpoint and
+    ends; after a second, it ends at once.
     """
     try:
         if not task.sweep.is_one:
-            raise FileError(f"{task.sweep.path} is not there: the sweep's files must be shared")
+            raise FileError(
+                f"{task.sweep.path} does not exist: the files of a sweep must be shared"
+            )
         with explained(f"cannot run {task.point.name}"), _locked(task.log, stops) as log:
             if task.status == "done":
                 return _done(task)
@@ -106,7 +108,7 @@ def execute(task: Task, stops: Callable[[], int] = lambda: 0) -> Outcome:
 
 
 def standing(task: Task) -> Outcome:
-    """How a point stands by its files, whoever ran it."""
+    """The state of a point from its files."""
     name = task.point.name
     if task.status == "done":
         return _done(task)
@@ -123,7 +125,7 @@ def _done(task: Task, how: str = "") -> Outcome:
 def _attempt(task: Task, log: BinaryIO, stops: Callable[[], int]) -> Outcome:
     task.failure.unlink(missing_ok=True)
     command = task.command()
-    with suppress(OSError):  # the disk is full: the run will say so
+    with suppress(OSError):  # the disk is full: the run reports that
         log.write(f"$ sph {shlex.join(command[3:])}\n".encode(errors="surrogateescape"))
     begin = log.tell()
     # A session of its own: Ctrl-C at the terminal reaches us alone, and we pass it on once.
@@ -144,7 +146,7 @@ def _attempt(task: Task, log: BinaryIO, stops: Callable[[], int]) -> Outcome:
 
 
 def _wait(child: subprocess.Popen, stops: Callable[[], int]) -> int:
-    """The exit code of `child`, which is sent a SIGTERM for each stop that is asked for."""
+    """The exit code of `child`; sends it a SIGTERM for each stop signal."""
     sent = 0
     try:
         while True:
@@ -154,33 +156,33 @@ def _wait(child: subprocess.Popen, stops: Callable[[], int]) -> int:
                 child.terminate()
                 sent += 1
     finally:
-        if child.returncode is None and not sent:  # we are being torn down: do not leave it alone
+        if child.returncode is None and not sent:  # this process is ending: end the child too
             child.terminate()
 
 
 def _reason(task: Task, code: int, begin: int) -> str:
-    """Why an attempt failed: in the summary's words, or the last that the run said."""
+    """Why an attempt failed: from the summary, or else the last message of the run."""
     if code == NumericalError.exit_code and task.status == "failed":
         return str(task.run.read_summary().get("reason"))
     said = task.log.read_bytes()[begin:].decode(errors="replace").strip()
     message = re.search(r"^sph: (.*)", said, re.MULTILINE | re.DOTALL)
-    last = said.splitlines()[-1] if said else "it said nothing"
+    last = said.splitlines()[-1] if said else "no message"
     return message[1] if message else f"exit code {code}: {last}"
 
 
 @contextmanager
 def _locked(path: Path, stops: Callable[[], int]) -> Iterator[BinaryIO]:
-    """`path`, open to append to and locked, as soon as no process holds it. Raises Stopped."""
+    """Wait until no process locks `path`, then open it to append, with a lock. Raises Stopped."""
     with open(open_to_append(path), "ab", buffering=0) as file:
         while True:
             with suppress(BlockingIOError):
                 fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
                 break
             if stops():
-                raise Stopped("another process is at it")
+                raise Stopped("another process is running this point")
             time.sleep(POLL)
         if stops():
-            raise Stopped("it was not begun")
+            raise Stopped("not started")
         yield file
 
 

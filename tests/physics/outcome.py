@@ -26,7 +26,7 @@ class Outcome:
 
     @property
     def pressure(self):
-        return self.particles.pressure_by(self.simulation.scene.eos)
+        return self.simulation.scene.formulation.pressure(self.particles)
 
     @property
     def energy_drift(self) -> float:

@@ -12,8 +12,8 @@ from sph.clock import Clock
 from sph.scene import Scene
 from sph.simulation import Simulation
 
-CONDUCTIVITIES = registry.names("sph.conductivity")
-SCHEMES = registry.names("sph.schemes")
+CONDUCTIVITIES = registry.names("sph.parts.conductivity")
+SCHEMES = registry.names("sph.formulations.gas.schemes")
 
 
 def load(stem, *overrides):
@@ -90,7 +90,7 @@ def test_pressure_across_contact_even_only_with_pressure_energy():
     def unevenness(scheme):
         outcome = simulate(load("square", "problem.n=448", f"physics.scheme='{scheme}'"), 0)
         p = outcome.particles
-        return np.ptp(p.pressure_by(outcome.simulation.scene.eos)) / 2.5
+        return np.ptp(outcome.simulation.scene.formulation.pressure(p)) / 2.5
 
     # the smoothed density misses the jump of 4 by most of itself next to it
     assert unevenness("grad_h") > 0.5

@@ -173,7 +173,7 @@ def test_random_riemann_states_conserve_or_fail_cleanly(
     state = InitialState(x[None], v[side][None], mass, (P / (0.4 * rho))[side])
     words = attempt(state, 1, boundary, scene)
     if mass.max() < 10.0 * mass.min() and words:  # 48 particles cannot be alike at any contrast
-        assert "needs a kernel support" in words
+        assert "needs a support radius" in words
 
 
 @pytest.mark.parametrize("scene", SCENES)

@@ -1,8 +1,8 @@
 """The schemes written out densely in double precision: what the engine is measured against.
 
 Every particle meets every particle and every image of it; nothing here knows of trees, blocks or
-lists, and nothing is imported from the program. Equation numbers are those of the paper's grad-h
-section unless another paper is named; where it misprints, the correction stands beside the formula.
+lists, and nothing is imported from the program. Equation numbers are those of
+docs/equations.md unless another publication is named.
 Code units throughout; vectors are (D, N), scalars (N,).
 """
 
@@ -26,7 +26,7 @@ def wendland_c2(q, dimension):
 
 
 def cubic_spline(q, dimension):
-    """(w, dw/dq) of the draft's appendix at q = r/H, an array; zero from q = 1 on."""
+    """(w, dw/dq) of eqs 115 and 116 at q = r/H, an array; zero from q = 1 on."""
     p = np.maximum(1.0 - q, 0.0)
     norm = 2**dimension * (2 / 3, 10 / (7 * np.pi), 1 / np.pi)[dimension - 1]
     value = np.where(q < 0.5, 1 - 6 * q**2 + 6 * q**3, 2 * p**3)
@@ -70,8 +70,7 @@ KERNELS = {
     "cubic_spline": cubic_spline,
     "quintic_spline": quintic_spline,
 }
-# H/h = 1/(2 sigma), sigma the standard deviation per axis at H = 1 (Dehnen & Aly 2012);
-# the paper prints 1.93492 for the 3-D Wendland kernel, which is sqrt(15)/2 = 1.936492.
+# H/h = 1/(2 sigma), sigma the standard deviation per axis at H = 1 (eq 110).
 H_PER_h = {
     "wendland_c2": np.sqrt([21 / 2, 72 / 5, 15]) / 2,
     "wendland_c4": np.sqrt([15, 132 / 7, 39 / 2]) / 2,
@@ -303,7 +302,7 @@ def _smoothing(scene, position, mass, guess):
             before = support
             rho, omega, omega_scale = _density(scene, position, mass, before)
             support = scene.h_ratio * scene.eta * (mass / rho) ** (1 / scene.dimension)  # eq 15
-        # not the paper's: where the passes do not settle, eqs 7 and 15 are solved together
+        # where the passes do not settle, eqs 7 and 15 are solved together (eq 47)
         unsettled = abs(support / before - 1) > scene.unsettled
         if unsettled.any():
             solved = _converged_support(scene, position, mass, guess)
@@ -340,7 +339,7 @@ def _flow(scene, pairs, mass, velocity, state):
     w_dW = weight[pairs.j] * scene.kernel_at(pairs.r, state["support"][pairs.i])[1]
     v_ij = pairs.difference(velocity)
     per_volume = 1 / (state["omega"] * state["density"] * weight / mass)
-    # eq 16 is printed without this minus: with v_ij = v_i - v_j an expansion would be negative
+    # eq 16: without this minus the divergence of an expansion would be negative
     approach = -w_dW * (v_ij * pairs.unit).sum(axis=0)
     turn = w_dW * _cross(v_ij, pairs.unit)
     return {
@@ -450,7 +449,7 @@ PRESSURES = {
 def _viscosity(pairs, alpha, state, w_ij, v_sig):
     """(P,) the viscous term f_ij Pi_ij of eq 24."""
     i, j, rho, f = pairs.i, pairs.j, state["density"], state["balsara"]
-    # eq 24 prints one alpha; with one per particle the pair takes their mean
+    # eq 24: the pair takes the mean of its coefficients
     term = -0.5 * 0.5 * (alpha[i] + alpha[j]) * v_sig * w_ij / (0.5 * (rho[i] + rho[j]))
     return term * 0.5 * (f[i] + f[j])
 
@@ -475,7 +474,7 @@ def conducting_share(scene, pairs, mass, velocity, energy, state):
 
 
 def _fastest_approach(pairs, velocity, state):
-    """(N,) largest (c_i + c_j)/2 - min(0, v_ij.e_ij) in the support, Cullen & Dehnen's eq 15."""
+    """(N,) largest (c_i + c_j)/2 - min(0, v_ij.e_ij) in the support, eq 76."""
     i, j, sound = pairs.i, pairs.j, state["sound_speed"]
     within = pairs.r < state["support"][i]
     closing = np.minimum((pairs.difference(velocity) * pairs.unit).sum(axis=0), 0.0)
@@ -555,9 +554,9 @@ def _gradient(scene, pairs, mass, support, field):
 
 
 def shock_alpha(scene, pairs, mass, velocity, acceleration, alpha, dt, state):
-    """(N,) alpha after dt by Cullen & Dehnen (2010), their eqs 13-18; h there is H here."""
+    """(N,) alpha after dt by eqs 70-78."""
     n, i, j, H = len(mass), pairs.i, pairs.j, state["support"]
-    v_sig = _fastest_approach(pairs, velocity, state)  # eq 15
+    v_sig = _fastest_approach(pairs, velocity, state)  # eq 76
     L = _gradient(scene, pairs, mass, H, velocity)
     divergence = np.trace(L, axis1=1, axis2=2)
     rate = np.trace(_gradient(scene, pairs, mass, H, acceleration), axis1=1, axis2=2)
@@ -567,17 +566,17 @@ def shock_alpha(scene, pairs, mass, velocity, acceleration, alpha, dt, state):
     w = scene.kernel_at(pairs.r, H[i])[0]
     weight = scene.weight(mass)
     n_i = state["density"] * weight / mass
-    R = pairs.sum(np.sign(state["divergence"][j]) * weight[j] * w, n) / n_i  # eq 17
+    R = pairs.sum(np.sign(state["divergence"][j]) * weight[j] * w, n) / n_i  # eq 73
     converging = abs(2 * (1 - R) ** 4 * divergence) ** 2
     shear = np.einsum("nab,nab->n", S, S)
     flowing = converging + shear > 0
-    xi = converging / np.where(flowing, converging + shear, 1.0)  # eq 18
-    shock = H**2 * xi * np.maximum(-rate, 0.0)  # eq 13
-    target = scene.alpha["max"] * shock / (v_sig**2 + shock)  # eq 14
+    xi = converging / np.where(flowing, converging + shear, 1.0)  # eq 74
+    shock = H**2 * xi * np.maximum(-rate, 0.0)  # eq 75
+    target = scene.alpha["max"] * shock / (v_sig**2 + shock)  # eq 77
     target = np.maximum(target, scene.alpha["min"])  # theirs is zero
     tau = H / (2 * scene.alpha["ell"] * v_sig)
     decayed = target + (alpha - target) * np.exp(-dt / tau)
-    return np.where(alpha < target, target, decayed)  # eq 16
+    return np.where(alpha < target, target, decayed)  # eq 78
 
 
 def _alpha_change(scene, alpha, state):
@@ -660,7 +659,7 @@ class State:
 
 
 def time_step(scene, internal_energy, now: Rates) -> float:
-    """Eq 32; `energy_limit` False leaves its u/|du/dt| out, as the draft does."""
+    """Eq 32; `energy_limit` False leaves its u/|du/dt| out."""
     limit = 2 * now.support / now.signal_speed
     if scene.energy_limit:
         with np.errstate(divide="ignore", invalid="ignore"):
@@ -719,7 +718,7 @@ def _step(scene, state, dt) -> State:
     )
     u_half = u + 0.5 * last.energy_rate * dt  # eq 3
     u_tilde = u + last.energy_rate * dt  # eq 5
-    alpha_half = state.alpha + 0.5 * last.alpha_rate * dt  # used in eq 31, defined nowhere
+    alpha_half = state.alpha + 0.5 * last.alpha_rate * dt  # eq 33
     alpha_tilde = state.alpha + last.alpha_rate * dt  # eq 6
     before = Before(a, dt)
     now = rates(scene, position, v_tilde, state.mass, u_tilde, last.support, alpha_tilde, before)

@@ -383,8 +383,8 @@ def test_one_step_equals_equations_1_to_6_and_29_to_31():
     assert second.dt == dense.time_step(scene, second.internal_energy, second.rates)
 
 
-def seed_shock_tube(count):
-    """The paper's shock tube on periodic [-1, 1]: (scene, gas)."""
+def shock_tube(count):
+    """A shock tube on periodic [-1, 1]: (scene, gas)."""
     spacing = 1.25 / count  # the mass, at density 1; 4/5 of the particles lie left
     left = -1 + (np.arange(count * 4 // 5) + 0.5) * spacing
     right = (np.arange(count // 5) + 0.5) * 4 * spacing
@@ -395,7 +395,7 @@ def seed_shock_tube(count):
 
 
 def test_shock_tube_conserves_and_flows_to_low_pressure():
-    scene, gas = seed_shock_tube(200)
+    scene, gas = shock_tube(200)
     final = dense.integrate(scene, dense.start(scene, *gas), 0.04, outputs=(0.01, 0.025))
     energy = np.array([moment.kinetic + moment.internal for moment in final.history])
     momentum = np.array([moment.momentum[0] for moment in final.history])

@@ -4,6 +4,7 @@ import dataclasses
 
 import numpy as np
 import pytest
+from states import copy_of
 
 from sph import config as configuration
 from sph.clock import Clock
@@ -11,7 +12,6 @@ from sph.domain import Domain
 from sph.integrators import step_size
 from sph.neighbours.approach import FAR, first_contact
 from sph.neighbours.search import Origin
-from sph.particles import Particles
 from sph.problems import uniform
 from sph.problems.base import InitialState
 from sph.scene import Scene
@@ -235,7 +235,7 @@ def test_restart_with_contact_bound_is_bit_for_bit(begin):
     first = begin(scene)
     assert first.limit.criterion == "approach"
     p = first.particles
-    copy = Particles(**{name: array.copy() for name, array in p.arrays().items()})
+    copy = copy_of(p)
     origin = Origin(*(array.copy() for array in first.search.origin[:2]), first.search.origin.skin)
     again = Simulation.resume(
         scene, copy, first.time, first.step, first.limit.dt, origin, 1, Clock()

@@ -133,7 +133,7 @@ def test_run_prints_only_summary_on_stdout(done):
     assert re.fullmatch(r"shock_tube: 61 particles to t = 0\.2 in \d+ steps \(done\)\.", lines[0])
     assert lines[1].startswith("Error (L1 against the exact solution, the whole domain): density ")
     assert any(line.startswith("Conserved, at worst over the run: energy to ") for line in lines)
-    assert any(line.startswith("Cost: ") and "compiling" in line for line in lines)
+    assert any(line.startswith("Cost: ") and "for compilation" in line for line in lines)
     assert lines[-1] == f"Results: {run} (`sph plot {run}` draws them)."
     assert "wrote checkpoint_000004.h5" in result.stderr
     assert "wrote" not in result.stdout
@@ -229,7 +229,7 @@ def test_restart_with_damaged_checkpoint_notes_skipping_it(done, tmp_path):
     result = sph_("restart", run)
     assert result.exit_code == 0
     assert (
-        "checkpoint_000004.h5 is passed over (cannot be read): going on from checkpoint_000003"
+        "checkpoint_000004.h5 is skipped (it cannot be read): continuing from checkpoint_000003"
         in result.stderr
     )
     assert hashes(run) == hashes(done[0])
@@ -444,7 +444,7 @@ def test_signal_during_run_writes_checkpoint_and_exits_with_75(number, config, t
     code, out, err = finished(process)
     assert (code, out) == (75, "")
     assert "stopped by " + {2: "Ctrl-C", 15: "SIGTERM"}[number] in err
-    assert "`sph restart run` goes on from there" in err
+    assert "`sph restart run` continues the run" in err
     assert "Traceback" not in err
     summary = json.loads((tmp_path / "run" / "summary.json").read_text())
     assert summary["status"] == "stopped"
@@ -484,7 +484,7 @@ def test_stop_while_compiling_and_restart_equals_uninterrupted_run(config, tmp_p
     assert code == 0, err
     code, out, err = finished(started(tmp_path, "run", config, "-o", "other", **cache))
     assert code == 0, err
-    assert "of which 0 s compiling" in out  # else this shows nothing
+    assert "and 0 CPU s for compilation" in out  # else this shows nothing
     assert "compiling the code" not in err
     found = hashes(tmp_path / "stopped")
     assert len(found) == 5

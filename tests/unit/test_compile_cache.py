@@ -147,8 +147,8 @@ def assert_uncached(capsys, *words):
     assert called() == (6.0, False)
     assert called() == (6.0, False)
     told = capsys.readouterr().err
-    assert told.count("sph: compiled code cannot be kept in ") == 1
-    assert "Try: the variable NUMBA_CACHE_DIR" in told
+    assert told.count("sph: compiled code cannot be cached in ") == 1
+    assert "variable NUMBA_CACHE_DIR" in told
     for word in words:
         assert word in told
 
@@ -177,7 +177,7 @@ def test_directory_of_other_user_is_not_used(cache, capsys, monkeypatch):
     cache()
     mine = os.geteuid()
     monkeypatch.setattr(os, "geteuid", lambda: mine + 1)
-    assert_uncached(capsys, f"belongs to another user (number {mine})")
+    assert_uncached(capsys, f"belongs to another user (UID {mine})")
 
 
 @pytest.mark.parametrize("mode", [0o770, 0o777])
@@ -200,7 +200,7 @@ def test_unwritable_home_compiles_and_warns(tmp_path):
     nowhere = {"HOME": "/dev/null", "XDG_CACHE_HOME": "/dev/null/cache"}
     (value, hits, misses), told = in_new_process(tmp_path, **nowhere)
     assert (value, hits, misses) == (7.0, 0, 1)
-    assert told.startswith("sph: compiled code cannot be kept in /dev/null/cache")
+    assert told.startswith("sph: compiled code cannot be cached in /dev/null/cache")
     assert "Not a directory" in told
     environment = {k: v for k, v in os.environ.items() if k != "NUMBA_CACHE_DIR"}
     done = subprocess.run(

@@ -11,21 +11,17 @@ import dense
 import numpy as np
 import pytest
 
-from sph import config, kernels, passes, registry, schemes, simulation
+from sph import config, passes, simulation
 from sph.clock import Clock
-from sph.config.sections import AlphaRange
+from sph.config import physics
 from sph.domain import Domain
-from sph.eos import ideal_gas
+from sph.formulations.gas.smoothing import Converged, FixedPasses
 from sph.neighbours import order as ordering
 from sph.neighbours.search import Origin, Search
-from sph.passes import contacts, density, rates, shocks
-from sph.passes.smoothing import Converged, FixedPasses
-from sph.passes.weighting import ByMass, ByNumber
 from sph.problems import base
 from sph.scene import Scene
+from sph.state import State
 from sph.threads import Team
-from sph.viscosity import balsara, constant
-from sph.viscosity.switches import cullen_dehnen, morris_monaghan
 
 # Of the sum of absolute pair terms. With a count of passes both sides do the same sums in another
 # order: 6e-15 is seen. A converged H is off by TIGHT where the engine stops its iteration (the
@@ -113,39 +109,10 @@ class Case:
         )
 
     @property
-    def conductivity_model(self):
-        if self.conductivity is None:
-            return None
-        name, strength = self.conductivity
-        return registry.model_class("sph.conductivity", name)(strength, self.switched_conductivity)
-
-    @property
-    def viscosity(self):
-        if self.finds_shocks:
-            return cullen_dehnen.CullenDehnen(**SHOCKS)
-        if self.evolves:
-            return morris_monaghan.MorrisMonaghan(**SWITCHED)
-        return constant.ConstantAlpha(self.alpha)
-
-    @property
-    def models(self):
-        parameters = {"flattened": self.flattened} if self.kernel == "cubic_spline" else {}
-        kernel = kernels.make(self.kernel, **parameters)
-        return passes.Models(
-            scheme=schemes.make(self.scheme),
-            kernel=kernel,
-            smoothing=Converged(TIGHT)
-            if self.passes == "converged"
-            else FixedPasses(self.passes, TIGHT),
-            weighting=ByNumber() if self.density == "number" else ByMass(),
-            eos=ideal_gas.IdealGas(1.4),
-            viscosity=self.viscosity,
-            conductivity=self.conductivity_model,
-            balsara=balsara.Balsara() if self.balsara else None,
-            support_ratio=kernels.support_ratio(kernel, self.dimension),
-            eta=self.eta,
-            max_support=np.inf,
-        )
+    def smoothing(self):
+        if self.passes == "converged":
+            return Converged(TIGHT)
+        return FixedPasses(self.passes, TIGHT)
 
 
 W, S = "wendland_c2", "cubic_spline"
@@ -266,15 +233,17 @@ def random_gas(case, lists, seed=3):
     ), skin
 
 
-def pass_over(function, team, case, gas, search, alpha, *arrays):
-    """Run a pass over all blocks with the arguments that both passes share."""
-    neighbours = passes.Neighbours(
+def forget(one, state):
+    """Set what a pass writes and does not read to NaN: what the pass forgets is then seen."""
+    for name in set(one.writes) - set(one.reads):
+        getattr(state, name)[:] = np.nan
+
+
+def make(one, sweep, search):
+    sweep.neighbours = passes.Neighbours(
         search.lists, search.images, search.origin.support, search.reach_factor
     )
-    blocks = ordering.number_of_blocks(gas.mass.size)
-    state = passes.Gas(gas.position, gas.velocity, gas.mass, gas.energy, gas.support)
-    dim = (0,) * case.dimension
-    team.run(function, blocks, dim, case.models, neighbours, state, alpha, *arrays)
+    one.run(sweep)
 
 
 def run_engine(case, gas, skin, threads):
@@ -286,57 +255,40 @@ def run_engine(case, gas, skin, threads):
     identity = np.arange(count)
     search.build(Origin(gas.earlier, gas.listed, skin), identity)
     assert not search.stale(gas.position, gas.support)
-    # what a pass forgets to write stays NaN and is seen
-    fields = passes.Fields(*np.full((5, count), np.nan))
-    summed = None
-    if schemes.sums_pressure(case.models.scheme):
-        summed = passes.SummedPressure(*np.full((2, count), np.nan))
-    alpha = gas.alpha if case.evolves else None
-    needed = case.balsara or case.evolves or case.finds_shocks
-    div_v = np.full(count, np.nan) if needed else None
-    curl_v = np.full(count, np.nan) if case.balsara and case.dimension > 1 else None
-    f = np.full(count, np.nan) if case.balsara else None
-    alpha_rate = np.full(count, np.nan) if case.evolves else None
-    wanted = np.full(ordering.number_of_blocks(count), np.nan)
+    scene = scene_of(case, gas, 1.0)
+    state = State.at_start(scene.fields, gas.position, gas.velocity, gas.mass, gas.energy)
+    state.predicted_velocity[:] = gas.velocity
+    state.predicted_energy[:] = gas.energy
+    state.support[:] = gas.support
+    state.acceleration[:] = gas.acceleration
+    for name in ("alpha", "predicted_alpha"):
+        if state.get(name) is not None:
+            state.get(name)[:] = gas.alpha
+    sweep = passes.Sweep(state, team, ordering.number_of_blocks(count))
+    sweep.models = scene.formulation.models._replace(smoothing=case.smoothing)
+    sweep.dt = STEP
+    sweep.wanted.fill(np.nan)
+    density, *others = scene.passes
+    forget(density, state)
     widenings = -1
-    while np.any(wanted != 0):
-        if wanted.max() > 0:
-            search.widen(gas.position, wanted, identity)
-        pass_over(
-            density.density, team, case, gas, search, alpha, fields, summed, div_v, curl_v, f,
-            alpha_rate, wanted,
-        )  # fmt: skip
+    while np.any(sweep.wanted != 0):
+        if sweep.wanted.max() > 0:
+            search.widen(gas.position, sweep.wanted, identity)
+        make(density, sweep, search)
         widenings += 1
-    if case.finds_shocks:
-        alpha = gas.alpha.copy()
-        pass_over(
-            shocks.shocks, team, case, gas, search, alpha, fields, div_v, gas.acceleration, STEP
-        )
-    shares = np.full(count, np.nan) if case.switched_conductivity else None
-    if shares is not None:
-        pass_over(contacts.contacts, team, case, gas, search, shares, fields)
-    acceleration = np.full(gas.position.shape, np.nan)
-    energy_rate, signal_speed = np.full((2, count), np.nan)
-    conducted = gas.energy if case.conductivity else None
-    pass_over(
-        rates.rates, team, case, gas, search, alpha, fields, summed, f, conducted, shares,
-        acceleration, energy_rate, signal_speed,
-    )  # fmt: skip
+    for one in others:
+        forget(one, state)
+        make(one, sweep, search)
     team.close()
-    found = fields._asdict()
-    found["pressure"] = found.pop("pressure_term") * found["omega"] * found["density"] ** 2
-    if summed is not None:
-        found["pressure"] = summed.pressure
-    found |= {
-        "divergence": div_v,
-        "curl": curl_v,
-        "balsara": f,
-        "alpha": alpha,
-        "alpha_rate": alpha_rate,
-        "acceleration": acceleration,
-        "energy_rate": energy_rate,
-        "signal_speed": signal_speed,
-    }
+    found = {
+        name: state.get(name)
+        for name in ("support", "density", "omega", "sound_speed", "acceleration", "energy_rate",
+                     "signal_speed", "balsara", "alpha_rate", "alpha")
+    }  # fmt: skip
+    found["pressure"] = state.pressure_term * state.omega * state.density**2
+    if scene.formulation.scheme.sums_pressure:
+        found["pressure"] = state.pressure
+    found |= {"divergence": state.get("div_v"), "curl": state.get("curl_v")}
     return gas, {name: array for name, array in found.items() if array is not None}, widenings
 
 
@@ -413,8 +365,8 @@ def moving_gas(box, count):
     return base.InitialState(position, velocity, mass, random.uniform(0.8, 1.6, n))
 
 
-def simulate(case, gas, end, threads=1):
-    """(the simulation at `end`, the times it went through); particles by ID and in the box."""
+def scene_of(case, gas, end):
+    """The scene of a case, for a given gas."""
     low, high = case.box.T
     problem = GivenGas(
         name="given",
@@ -425,27 +377,32 @@ def simulate(case, gas, end, threads=1):
         given=gas,
     )
     alpha = case.alpha
-    if case.evolves:
-        alpha = AlphaRange(**alpha)
     if case.finds_shocks:
-        alpha = AlphaRange(**alpha, switch="cullen_dehnen")
+        alpha = {**alpha, "switch": "cullen_dehnen"}
     name, strength = case.conductivity or (None, None)
-    physics = config.Physics(
+    kernel = {"name": case.kernel, "flattened": True} if case.flattened else case.kernel
+    settings = physics.table("gas")(
         gamma=1.4, alpha=alpha, eta=case.eta, density_passes=case.passes, scheme=case.scheme,
         conductivity=name
         and {"name": name, "strength": strength, "switched": case.switched_conductivity},
-        density=case.density,
+        density=case.density, kernel=kernel, balsara=case.balsara, allow_pairing=True,
     )  # fmt: skip
-    whole = config.Config(
-        problem,
-        physics,
-        config.Time(end=end),
-        config.Output(interval=end),
-        config.Report(),
-        config.Run(),
+    return Scene(
+        config.Config(
+            problem,
+            settings,
+            config.Time(end=end),
+            config.Output(interval=end),
+            config.Report(),
+            config.Run(),
+        )
     )
+
+
+def simulate(case, gas, end, threads=1):
+    """(the simulation at `end`, the times it went through); particles by ID and in the box."""
     clock = Clock()
-    run = simulation.Simulation.start(Scene(whole), threads, clock)
+    run = simulation.Simulation.start(scene_of(case, gas, end), threads, clock)
     times = [run.time]
     while run.time < end:
         run.advance(end)

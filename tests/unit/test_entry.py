@@ -84,7 +84,7 @@ def test_output_without_docstrings_is_equal(command):
 def test_docstring_read_from_source():
     assert docstring(sys.modules[__name__]) == __doc__
     assert docstring(python) == ""
-    assert docstring(docstring).startswith("The docstring of a module, class or function")
+    assert docstring(docstring).startswith("Return the docstring of a module, class or function")
 
 
 @pytest.mark.parametrize("missing", ["fcntl", "resource"])
@@ -92,4 +92,6 @@ def test_system_without_posix_exits_with_4(missing):
     code = f"import sys; sys.modules[{missing!r}] = None; from sph.__main__ import main; main()"
     done = python("-c", code)
     assert (done.returncode, done.stdout) == (4, "")
-    assert done.stderr.startswith("sph: this system is not POSIX: sph runs on Linux and macOS.\n")
+    assert done.stderr.startswith(
+        "sph: this operating system is not supported: expected Linux or macOS.\n"
+    )

@@ -6,8 +6,8 @@ from numba import njit
 
 from sph import conductivity, eos, registry, viscosity
 from sph.compiled import COMPILED
-from sph.viscosity import balsara, constant
-from sph.viscosity.switches import cullen_dehnen, morris_monaghan
+from sph.parts.viscosity import balsara, constant
+from sph.parts.viscosity.switches import cullen_dehnen, morris_monaghan
 
 FEW_ROUNDINGS = 1e-14  # of some operations at 1e-16 each
 DENSITY, ENERGY = np.array([0.125, 1.0, 4.0]), np.array([2.0, 0.5, 1e-12])

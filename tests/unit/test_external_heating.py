@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from sph import config as configuration
-from sph.external.point_mass import PointMass
-from sph.heating.relaxation import Relaxation
+from sph.parts.external.point_mass import PointMass
+from sph.parts.heating.relaxation import Relaxation
 
 BOX = """
 [problem]
@@ -118,6 +118,6 @@ def test_rates_use_energy_after_heating(begin):
 
 
 def test_scene_without_field_and_heating_has_neither(begin):
-    _inside, outside = begin([]).scene.parts()
+    _inside, outside = begin([]).scene.described()
     assert "external field: physics.external is not given" in outside
     assert "heating: physics.heating is not given" in outside

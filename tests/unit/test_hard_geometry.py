@@ -10,8 +10,8 @@ import pytest
 
 from sph import config as configuration
 from sph.errors import NumericalError
+from sph.formulations.gas.smoothing import UNSETTLED
 from sph.neighbours import first_guess
-from sph.passes.smoothing import UNSETTLED
 from sph.problems import uniform
 from sph.problems.base import InitialState
 from sph.scene import Scene
@@ -242,7 +242,7 @@ def test_counted_passes_at_mass_jump_diverge_without_solver(begin):
 
     def farthest(unsettled):
         simulation = begin(x[None], "periodic", mass)
-        models = simulation.scene.models
+        models = simulation.scene.formulation.models
         models = models._replace(smoothing=models.smoothing._replace(unsettled=unsettled))
         solved = simulation.particles.support.copy()  # the start's are
         for _ in range(20):  # nothing moves: a support that is found stays

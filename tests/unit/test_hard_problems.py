@@ -136,12 +136,12 @@ def test_contrast_equal_masses_uses_unequal_spacing(dimension, n, ratio):
 
 
 def test_contrast_step_with_equal_masses_is_refused():
-    with pytest.raises(ValidationError, match="take shock_tube"):
+    with pytest.raises(ValidationError, match="shock_tube"):
         Contrast(masses="equal")
 
 
 def test_contrast_thin_gas_narrower_than_support_is_refused():
-    with pytest.raises(ValidationError, match="expected 4; take more particles"):
+    with pytest.raises(ValidationError, match=r"expected 4\."):
         Contrast(dimension=2, n=1000, masses="equal", profile="graded")
 
 
@@ -198,7 +198,7 @@ def test_blob_heated_or_thinned_gas_is_not_cloud():
 
 
 def test_blob_cloud_too_large_for_box_is_refused():
-    with pytest.raises(ValidationError, match="narrower than the box"):
+    with pytest.raises(ValidationError, match="expected a diameter below"):
         Blob(radius=5.0)
 
 
@@ -270,11 +270,11 @@ def test_given_particles_report_centre_of_mass_error():
 @pytest.mark.parametrize(
     ("keys", "message"),
     [
-        ({"n": 3}, "expected the number of positions, 2"),
-        ({"positions": [[0.0, 1.0], [0.0, 0.0]]}, "has not 1 components"),
-        ({"velocities": [[0.0]]}, "velocities: 1 of them, expected 2"),
-        ({"masses": [1.0, 0.0]}, "expected above 0"),
-        ({"internal_energies": -1.0}, "expected above 0"),
+        ({"n": 3}, "expected 2, the number of positions"),
+        ({"positions": [[0.0, 1.0], [0.0, 0.0]]}, "expected 1 components"),
+        ({"velocities": [[0.0]]}, "velocities: 1 values; expected 2"),
+        ({"masses": [1.0, 0.0]}, "expected values above 0"),
+        ({"internal_energies": -1.0}, "expected values above 0"),
         ({"positions": [[0.0], [1.5]], "boundary": "mirror"}, r"\[1.5\] is outside \[-1.0, 1.0\]"),
         ({"positions": []}, "at least 1 item"),
     ],

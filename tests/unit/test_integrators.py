@@ -197,7 +197,7 @@ def test_leapfrog_stable_up_to_formula(damping):
 @pytest.mark.parametrize(
     ("C", "alpha", "held", "criterion"),
     [
-        (0.15, 3.0, 0.15, "signal_speed"),  # the seed's own
+        (0.15, 3.0, 0.15, "signal_speed"),  # no bound by viscosity
         (0.3, 1.0, 0.3, "signal_speed"),
         (2.0, 0.0, 0.5, "signal_speed"),
         (0.15, 8.0, 0.0615528, "viscosity"),

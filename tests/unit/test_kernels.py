@@ -1,4 +1,4 @@
-"""Every kernel of the folder: normalised, compact, of its own slope, and as the paper prints it."""
+"""Every kernel of the folder: normalised, compact, of its own slope, as in docs/equations.md."""
 
 import math
 
@@ -38,7 +38,7 @@ def quadrature():
     return ((nodes + 1) / 2 + sixth).ravel() / 6, np.tile(weights, 6) / 12
 
 
-def test_kernels_of_the_paper_are_available():
+def test_common_kernels_are_available():
     assert {"wendland_c2", "cubic_spline"} <= set(registry.names("sph.kernels"))
 
 
@@ -98,21 +98,21 @@ def test_flattened_slope_constant_within_one_third(dimension):
 
 
 @every_dimension
-def test_wendland_c2_matches_paper(dimension):
+def test_wendland_c2_matches_eqs_11_to_14(dimension):
     kernel, dim, q = kernels.make("wendland_c2"), (0,) * dimension, np.linspace(0.001, 1, 50)
     C = {1: 5 / 4, 2: 7 / math.pi, 3: 21 / (2 * math.pi)}[dimension]
     if dimension == 1:
         value, slope = (1 - q) ** 3 * (1 + 3 * q), 3 * ((1 - q) ** 3 - (1 - q) ** 2 * (1 + 3 * q))
     else:
         value, slope = (1 - q) ** 4 * (1 + 4 * q), 4 * ((1 - q) ** 4 - (1 - q) ** 3 * (1 + 4 * q))
-    # 1e-15: a few roundings of numbers of order one; the paper's slope subtracts such
+    # 1e-15: a few roundings of numbers of order one; the slopes of eqs 12 and 14 subtract such
     np.testing.assert_allclose(kernel.normalisation(dim) * kernel.w(dim, q), C * value, atol=4e-15)
     assert kernel.normalisation(dim) == C
     np.testing.assert_allclose(kernel.dw_over_q(dim, q) * q, slope, atol=4e-15)
 
 
 @every_dimension
-def test_cubic_spline_matches_paper(dimension):
+def test_cubic_spline_matches_eqs_115_and_116(dimension):
     kernel, dim, q = kernels.make("cubic_spline"), (0,) * dimension, np.linspace(0.001, 1, 50)
     C = {1: 4 / 3, 2: 40 / (7 * math.pi), 3: 8 / math.pi}[dimension]
     inner = q < 0.5

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from sph import lattice
+from sph.problems.support import lattice
 
 KINDS = [
     ("cubic", 1),
@@ -112,9 +112,9 @@ def test_adjacent_stacks_continue_lattice():
 
 def test_lattice_for_other_dimension_is_refused_with_alternative():
     for kind, dimension in (("hexagonal", 3), ("hexagonal", 1), ("bcc", 2), ("bcc", 1)):
-        with pytest.raises(ValueError, match=r'take "cubic"'):
+        with pytest.raises(ValueError, match=r'expected "cubic"'):
             lattice.fill(np.array([[0.0, 1.0]] * dimension), 100, kind)
-    with pytest.raises(ValueError, match='no lattice "fcc"'):
+    with pytest.raises(ValueError, match='lattice "fcc": expected'):
         lattice.unit_cell("fcc", 3)
 
 

@@ -10,7 +10,7 @@ from sph.domain import Domain
 from sph.errors import NumericalError
 from sph.neighbours import first_guess, lists, order
 from sph.neighbours.order import BLOCK
-from sph.neighbours.search import GROWTH, Origin, Search, best_skin
+from sph.neighbours.search import BUILD_OVER_PASSES, GROWTH, Origin, Search, best_skin
 from sph.threads import Team
 
 SHAPES = ["random", "clustered", "line", "plane", "equal_coordinates", "coincident"]
@@ -273,7 +273,7 @@ def test_unsupported_supports_and_counts_are_refused(monkeypatch):
         search_over(("periodic",), position, np.full(10, 600.0), 0.1)
     monkeypatch.setattr(lists, "MAX_PARTICLES", 9)
     search = Search(Domain(np.array([[0.0, 1.0]]), ("open",)), Team(1))
-    with pytest.raises(NumericalError, match="10 particles are more than the 9"):
+    with pytest.raises(NumericalError, match="10 particles: expected at most 9"):
         search.order(position, np.arange(10))
 
 
@@ -290,6 +290,18 @@ def test_lists_rebuilt_equal_for_any_capacity():
 # --- skin and first guess ---
 
 
+def test_lists_are_built_again_where_any_chunk_has_too_little_room():
+    search, _ = search_over(("mirror",), positions("random", 1, 600), supports(1, 600) / 8, 0.1)
+    expected, needed = listed(search), search._room
+    assert needed.size == 3
+    assert needed.min() > 64  # what a region has to spare
+    for chunk in range(3):
+        search._room = np.where(np.arange(3) == chunk, 0, needed)
+        search.build(search.origin, np.arange(600))
+        np.testing.assert_array_equal(search._room, needed)
+        np.testing.assert_array_equal(listed(search), expected)
+
+
 @pytest.mark.parametrize("dimension", [1, 2, 3])
 def test_skin_covers_step_and_grows_while_worthwhile(dimension):
     assert best_skin(0.0, dimension) == GROWTH  # lists for ever need only the room for growth
@@ -298,6 +310,16 @@ def test_skin_covers_step_and_grows_while_worthwhile(dimension):
         assert kept == pytest.approx(round(kept), abs=1e-9)  # a whole number of steps; rounding
         assert 1 <= round(kept) <= 20
     assert best_skin(1e3, dimension) == GROWTH  # too fast to keep any: build at every step
+
+
+@pytest.mark.parametrize("dimension", [1, 2, 3])
+def test_skin_is_the_cheapest_of_those_for_a_whole_number_of_steps(dimension):
+    for step in [0.0, *np.geomspace(1e-7, 10.0, 300).tolist()]:
+        costs = [
+            (BUILD_OVER_PASSES / k + (1 + GROWTH + 2 * (k - 1) * step) ** dimension, k)
+            for k in range(1, 21)
+        ]
+        assert best_skin(step, dimension) == GROWTH + 2 * (min(costs)[1] - 1) * step
 
 
 def arranged(shape, dimension, count, random):

@@ -27,7 +27,7 @@ FIRST_STEP = """
 import json, re
 from sph import config
 from sph.clock import Clock
-from sph.passes import density, rates
+from sph.formulations.gas import density, rates
 from sph.scene import Scene
 from sph.simulation import Simulation
 
@@ -194,7 +194,7 @@ def test_source_hash_depends_on_contents_and_names(tmp_path, monkeypatch):
 
 def test_compiled_functions_share_their_flags_and_are_all_cached():
     found = dict(dispatchers())
-    assert "sph.passes.rates.rates" in found
+    assert "sph.formulations.gas.rates.rates" in found
     flags = {"nopython": True, "boundscheck": None} | COMPILED
     del flags["cache"]
     for name, function in found.items():

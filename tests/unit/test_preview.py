@@ -45,7 +45,7 @@ def test_preview_lists_parts_in_and_left_out():
 def test_preview_lists_parts_disabled_by_configuration():
     config = configuration.from_text(TUBE)
     config = config.override(["physics.balsara=false", "physics.energy_limit=false"])
-    inside, outside = Scene(config).parts()
+    inside, outside = Scene(config).described()
     for part in ("Balsara", "divergence", "u/|du/dt|"):
         assert not any(part in one for one in inside)
         assert any(part in one for one in outside)

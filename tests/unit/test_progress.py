@@ -118,9 +118,8 @@ def test_bar_never_started_closes():
 def test_sweep_bar_counts_points_and_keeps_lines_whole(monkeypatch):
     stream = io.StringIO()
     monkeypatch.setattr(sys, "stderr", stream)
-    bar = progress.PointBar(4, 1)
-    bar.note("[2/4] b done")
-    bar.ended(2)
+    bar = progress.RunBar("points", 4, 1)
+    bar.ended("b done")
     bar._bar.refresh()
     bar.close()
     shown = stream.getvalue()
@@ -141,7 +140,18 @@ def test_progress_is_bar_on_terminal_and_lines_elsewhere(monkeypatch):
     assert type(progress.suited()) is progress.Bar
     on_terminal(monkeypatch, 0)
     assert type(progress.suited()) is progress.Lines
-    assert type(progress.suited_to_points(2, 0)) is progress.PointLines
+    assert type(progress.suited_to_runs("points", 2)) is progress.RunLines
+    on_terminal(monkeypatch, 80)
+    assert type(progress.suited_to_runs("trials", None)) is progress.RunLines
+
+
+def test_lines_of_many_runs_count_where_their_number_is_known(capsys):
+    known = progress.RunLines("runs", 12, 8)
+    known.ended("a: pass")
+    known.ended("b: pass")
+    progress.RunLines("trials", None, 0).ended("physics.C = 0.1: stable")
+    said = "8 of 12 runs are done already\n[ 9/12] a: pass\n[10/12] b: pass\n"
+    assert capsys.readouterr().err == f"{said}physics.C = 0.1: stable\n"
 
 
 def test_sweep_on_terminal_shows_bar(monkeypatch):

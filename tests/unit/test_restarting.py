@@ -1,4 +1,4 @@
-"""Restarts that have nothing to do, and what is told of settings changed on the way."""
+"""Restarts that have nothing to do, and what is told of changed settings."""
 
 import hashlib
 import json
@@ -28,7 +28,7 @@ interval = 0.01
 [run]
 threads = 1
 """
-END = "is at its end, t = 0.02"
+END = "has reached its end, t = 0.02"
 
 
 def sph_(*arguments):
@@ -62,7 +62,7 @@ def files(directory):
 @pytest.mark.parametrize(
     ("settings", "code", "words"),
     [
-        ([], 0, f"{END}: set a later time.end to go on."),
+        ([], 0, f"{END}. Try: a later time.end."),
         (["--threads", "2"], 0, END),
         (["--set", "time.end=0.02"], 0, END),
         (
@@ -95,7 +95,7 @@ def test_restart_to_earlier_end_changes_nothing(run, tmp_path):
     before = files(run.path)
     result = sph_("restart", run.checkpoint_path(1), "--set", "time.end=0.01")
     assert result.exit_code == 2
-    assert "is at its end, t = 0.01" in result.stderr
+    assert "has reached its end, t = 0.01" in result.stderr
     assert files(run.path) == before
 
 
@@ -170,7 +170,7 @@ def test_restart_with_changed_settings_is_reported(run, tmp_path):
     changes = ["--set", "time.end=0.04", "--set", "physics.alpha=2.0"]
     second = sph_("restart", run.path, *changes)
     told = "physics.alpha = 2.0 (was 1.0) at t = 0.03"
-    assert f"Settings changed on the way: {told}." in second.stdout
+    assert f"Settings changed in restarts: {told}." in second.stdout
     found = json.loads(run.summary.read_text())
     assert found["settings_changed"] == [told]
     last = checkpoints.read(run.latest())
@@ -179,7 +179,7 @@ def test_restart_with_changed_settings_is_reported(run, tmp_path):
     third = sph_("restart", run.path, "--set", "time.end=0.05")  # it stays told
     assert told in third.stdout
     said = sph_("report", run.path, "-o", tmp_path / "report").stdout
-    assert f"changed its settings on the way: {told}." in said
+    assert f"changed its settings in restarts: {told}." in said
 
 
 def test_restart_with_edited_config_file_is_noted(run):
@@ -259,7 +259,7 @@ def test_summary_of_earlier_checkpoint_counts_as_missing(place, summary, number,
 
 
 @pytest.mark.parametrize(
-    ("has_failed", "why"), [(True, "energy had drifted"), (False, "cannot be read")]
+    ("has_failed", "why"), [(True, "energy has drifted"), (False, "cannot be read")]
 )
 def test_skipped_checkpoints_are_reported_with_reason(place, has_failed, why):
     if has_failed:
@@ -267,7 +267,7 @@ def test_skipped_checkpoints_are_reported_with_reason(place, has_failed, why):
     notes = []
     restarting._note_damaged(place, place.checkpoint_path(1), SimpleNamespace(note=notes.append))
     (note,) = notes
-    assert "checkpoint_000002.h5 is passed over" in note
+    assert "checkpoint_000002.h5 is skipped" in note
     assert why in note
     assert "checkpoint_000001.h5" in note
 
@@ -289,9 +289,9 @@ def test_unused_file_settings_are_noted_except_threads(place):
     assert told(["physics.alpha=2.0"], "physics.alpha=2.0") == 0  # which is what goes on
     assert told(["physics.alpha=2.0"]) == 1
     assert "has physics.alpha = 2.0 (the checkpoint: 1.0)" in notes[0]
-    assert "going on with that of the checkpoint" in notes[0]
+    assert "continuing with that of the checkpoint" in notes[0]
     assert told(["physics.alpha=2.0"], "physics.alpha=3.0") == 1
-    assert "going on with that of --set" in notes[0]
+    assert "continuing with that of --set" in notes[0]
     assert told([], "physics.alpha=3.0") == 0  # the file has what the checkpoint has
 
 

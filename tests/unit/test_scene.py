@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from sph import config as configuration
-from sph.passes.smoothing import Converged, FixedPasses
-from sph.passes.weighting import ByMass, ByNumber
+from sph.formulations.gas.smoothing import Converged, FixedPasses
+from sph.formulations.gas.weighting import ByMass, ByNumber
 from sph.scene import Scene
 
 TEXT = '[problem]\nname = "uniform"\nn = 64\nboundary = "open"\n'
@@ -108,10 +108,10 @@ NOTHING = [STILL, "physics.energy_limit=false"]
 
 @pytest.mark.parametrize("part", PARTS)
 def test_scene_part_included_or_left_out_with_reason(part):
-    inside, outside = scene(*NOTHING, *PARTS[part]).parts()
+    inside, outside = scene(*NOTHING, *PARTS[part]).described()
     assert part in inside
     assert not any(one.startswith(f"{part}: ") for one in outside)
-    inside, outside = scene(*NOTHING).parts()
+    inside, outside = scene(*NOTHING).described()
     assert part not in inside
     (said,) = (one for one in outside if one.startswith(f"{part}: "))
     assert said != f"{part}: "
@@ -119,7 +119,7 @@ def test_scene_part_included_or_left_out_with_reason(part):
 
 
 def test_scene_names_parts_always_included():
-    inside, outside = scene("problem.boundary=periodic", "physics.density=number").parts()
+    inside, outside = scene("problem.boundary=periodic", "physics.density=number").described()
     assert inside[:6] == [
         "2-D, 9 image(s) of the box",
         "scheme grad_h, kernel wendland_c2",
@@ -131,7 +131,7 @@ def test_scene_names_parts_always_included():
     inside, outside = scene(
         LINE, "physics.kernel={ name = 'cubic_spline', flattened = true }",
         "physics.eta=1.2", "physics.density_passes='converged'",
-    ).parts()  # fmt: skip
+    ).described()  # fmt: skip
     assert inside[0] == "1-D, 1 image(s) of the box"
     assert "scheme grad_h, kernel cubic_spline, gradient flattened" in inside
     assert "supports converged to 1e-10" in inside

@@ -198,12 +198,12 @@ def test_unphysical_particle_is_named(begin, name, value):
     words = name.replace("_", " ")
     assert f"{words} of particle {simulation.particles.id[7]} at (" in str(caught.value)
     assert f"{value}" in str(caught.value)
-    assert "; 1 particle(s) are so" in str(caught.value)
+    assert "; 1 particle(s) affected" in str(caught.value)
     assert "Try: a smaller physics.C" in str(caught.value)
 
 
 def test_support_too_large_for_box_is_refused_at_start(begin):
-    with pytest.raises(NumericalError, match=r"particle \d+ needs a kernel support of .* times"):
+    with pytest.raises(NumericalError, match=r"particle \d+ needs a support radius of .* times"):
         begin(TUBE, "problem.boundary=periodic", "physics.eta=5e4")
 
 

@@ -195,7 +195,7 @@ def test_lists_never_wide_enough_name_block(hollow):
     one = hollow()
     one.asked = [[2]] * 1000
     with pytest.raises(NumericalError) as caught:
-        one._density(one.scene.models)
+        one._density(one.scene.formulation.models)
     assert caught.value.particle == one.particles.id[2 * BLOCK]
 
 

@@ -157,7 +157,7 @@ class FullStream(io.StringIO):
         raise OSError(28, "No space left on device")
 
 
-@pytest.mark.parametrize("say", [progress.Lines().note, progress.PointLines().note])
+@pytest.mark.parametrize("say", [progress.Lines().note, progress.RunLines("points", 2, 0).note])
 @pytest.mark.parametrize("kind", ["full", "closed", "none"])
 def test_notes_to_python_caller_dropped_when_unwritable(kind, say, monkeypatch, capsys):
     stream = {"full": FullStream(), "closed": io.StringIO(), "none": None}[kind]

@@ -2,18 +2,18 @@
 
 import numpy as np
 import pytest
+from states import gas_state
 
 from sph import config as configuration
 from sph import totals
-from sph.external.point_mass import PointMass
-from sph.particles import Particles
+from sph.parts.external.point_mass import PointMass
 from sph.totals import Baseline
 
 RANDOM = np.random.default_rng(3)
 
 
 def gas(dimension=2, n=50, boost=0.0):
-    particles = Particles.at_start(
+    particles = gas_state(
         RANDOM.uniform(size=(dimension, n)), RANDOM.normal(size=(dimension, n)),
         RANDOM.uniform(1.0, 2.0, n), RANDOM.uniform(1.0, 2.0, n),
     )  # fmt: skip

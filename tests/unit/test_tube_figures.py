@@ -5,8 +5,8 @@ import pytest
 
 from sph import eos
 from sph.exact import riemann
-from sph.problems import _tube_figures
 from sph.problems.shock_tube import Problem as ShockTube
+from sph.problems.support import tube_figures
 
 AIR = eos.make("ideal_gas", gamma=1.4)
 TIME = 0.1
@@ -23,7 +23,7 @@ def tube(x=None, states=(LEFT, RIGHT), time=TIME, **changed):
     density, velocity, pressure = riemann.solve(*states, AIR, xi)
     energy = AIR.internal_energy(density, pressure)
     exact = {"density": density, "internal_energy": energy}
-    whole = _tube_figures.Tube(
+    whole = tube_figures.Tube(
         states, AIR, time, x, np.ones(x.size, bool), density, velocity, pressure, energy,
         1.0 + np.arange(x.size) % 3, exact,
     )  # fmt: skip
@@ -37,13 +37,13 @@ def test_colliding_gas_has_states_these_tests_need():
 
 
 def test_peak_density_is_highest_of_all_states():
-    assert _tube_figures.of(tube())["peak_density_exact"] == STAR.density_right
+    assert tube_figures.of(tube())["peak_density_exact"] == STAR.density_right
     mirrored = tuple(one._replace(velocity=-one.velocity) for one in (RIGHT, LEFT))
-    found = _tube_figures.of(tube(states=mirrored))["peak_density_exact"]
+    found = tube_figures.of(tube(states=mirrored))["peak_density_exact"]
     assert found == pytest.approx(STAR.density_right, rel=ROUND_OFF)
     parting = tuple(one._replace(velocity=-one.velocity) for one in (LEFT, RIGHT))
-    assert _tube_figures.of(tube(states=parting))["peak_density_exact"] == 2.0
-    assert _tube_figures.of(tube(states=(RIGHT, LEFT)))["peak_density_exact"] == 2.0
+    assert tube_figures.of(tube(states=parting))["peak_density_exact"] == 2.0
+    assert tube_figures.of(tube(states=(RIGHT, LEFT)))["peak_density_exact"] == 2.0
 
 
 def test_density_error_adds_absolute_values():
@@ -52,7 +52,7 @@ def test_density_error_adds_absolute_values():
     wrong = right._replace(density=factor * right.density)
     volume = right.mass / wrong.density
     expected = volume @ np.abs(wrong.density - right.density) / (volume @ right.density)
-    found = _tube_figures.of(wrong)["density_L1_relative"]
+    found = tube_figures.of(wrong)["density_L1_relative"]
     assert found == pytest.approx(expected, rel=ROUND_OFF)
 
 
@@ -60,8 +60,8 @@ def test_vacuum_tube_has_no_plateaus_and_shocks():
     parting = riemann.State(1.0, -9.0, 1.0), riemann.State(1.0, 9.0, 1.0)
     x = np.linspace(0.35, 0.9, 50)  # the vacuum ends at 0.31
     states = {"peak_density_exact", "density_L1_relative"}
-    assert set(_tube_figures.of(tube(np.concatenate([-x, x]), parting))) == states
-    assert set(_tube_figures.of(tube(time=0.0))) == states
+    assert set(tube_figures.of(tube(np.concatenate([-x, x]), parting))) == states
+    assert set(tube_figures.of(tube(time=0.0))) == states
 
 
 def test_plateau_is_median_of_inner_part():
@@ -80,7 +80,7 @@ def test_plateau_is_median_of_inner_part():
             off[-1][::3] = 1
     exact = tube(np.concatenate(x))
     off = 5.0 * np.concatenate(off)
-    found = _tube_figures.of(
+    found = tube_figures.of(
         exact._replace(
             density=exact.density * (1.01 + off), velocity=exact.velocity - 0.02 - off,
             pressure=exact.pressure * (0.97 + off),
@@ -110,14 +110,14 @@ def test_shock_distance_relative_to_gas_ahead(side, too_far):
     density = ahead.density + share * (behind - ahead.density)
     here = exact.x < SPEED.contact * TIME if left else exact.x > SPEED.contact * TIME
     bent = exact._replace(density=np.where(here, density, exact.density))
-    assert _tube_figures.of(bent)[f"shock_{side}_error"] == pytest.approx(too_far, rel=1e-9)
+    assert tube_figures.of(bent)[f"shock_{side}_error"] == pytest.approx(too_far, rel=1e-9)
 
 
 def test_weak_shock_is_not_measured():
     """Of 1 % in density, as states in a few digits leave; one of 4 % is a shock."""
     for rise, there in ((1.014, False), (1.057, True)):
         push = riemann.State(1.0, 0.0, 1.0), riemann.State(1.0, 0.0, rise**2)
-        assert ("shock_left_error" in _tube_figures.of(tube(states=push))) == there
+        assert ("shock_left_error" in tube_figures.of(tube(states=push))) == there
 
 
 def test_contact_heating_is_maximum_between_outer_waves():
@@ -126,7 +126,7 @@ def test_contact_heating_is_maximum_between_outer_waves():
     inner = np.flatnonzero((SPEED.left_tail * TIME < exact.x) & (exact.x < SPEED.right_tail * TIME))
     heat[inner[[3, 7]]] = 1.2, 1.1
     heat[[inner[0] - 1, inner[-1] + 1]] = 3.0  # in the gas outside
-    found = _tube_figures.of(exact._replace(internal_energy=heat * exact.internal_energy))
+    found = tube_figures.of(exact._replace(internal_energy=heat * exact.internal_energy))
     assert found["contact_energy_excess"] == pytest.approx(0.2, rel=1e-9)
 
 

@@ -125,12 +125,12 @@ def test_large_alpha_and_courant_number_stay_stable(begin, monkeypatch, stiff):
         (("physics.alpha=3.0",), "a smaller physics.alpha", "larger physics.alpha"),
         (
             ("physics.alpha=8.0",),
-            "physics.C below 0.0616, at which physics.alpha holds it already",
+            "physics.C below 0.0616, to which physics.alpha already reduces it",
             "larger physics.alpha",
         ),
         (
             ("physics.alpha=0.0", "physics.C=3.0"),
-            "physics.C below 0.5, at which the stability of the leapfrog holds it already",
+            "physics.C below 0.5, to which the stability of the leapfrog already reduces it",
             "smaller physics.alpha",
         ),
         (
@@ -147,7 +147,7 @@ def test_suggestion_helps(begin, settings, words, not_words):
     remedy = faults.drift_remedy(simulation)
     assert words in remedy
     assert not_words not in remedy
-    held, words_of_it = simulation.scene.step_bounds.held[0], faults.held_courant(simulation.scene)
+    held, words_of_it = simulation.scene.step_bounds.courant, faults.held_courant(simulation.scene)
     assert (words_of_it is None) == (held == simulation.scene.config.physics.C)
 
 
@@ -157,7 +157,7 @@ def test_suggestion_helps(begin, settings, words, not_words):
         ("energy", (), "physics.energy_limit = false"),
         ("signal_speed", (), "a restart from an earlier checkpoint with a smaller physics.C"),
         ("signal_speed", ("physics.C=1e-5",), "a larger physics.C"),
-        ("viscosity", ("physics.alpha=16.0",), "less of what sets it: physics.alpha"),
+        ("viscosity", ("physics.alpha=16.0",), "a smaller value of physics.alpha"),
     ],
 )
 def test_suggestion_for_tiny_steps_is_not_smaller_courant_number(begin, criterion, settings, words):
@@ -170,7 +170,7 @@ def test_every_criterion_has_description():
     for criterion in step_size.CRITERIA:
         particle = 0 if criterion in ("growth", "end") else 7
         words = faults.what_sets(step_size.StepLimit(1.0, particle, criterion))
-        assert ("particle 7 sets it by" in words) == (particle == 7)
+        assert ("by particle 7" in words) == (particle == 7)
     assert "checkpoint" in faults.what_sets(step_size.StepLimit(1.0, 0, "checkpoint"))
     assert "box" in faults.what_sets(step_size.StepLimit(1.0, 0, "approach"))
 
@@ -256,7 +256,7 @@ def test_particle_lost_from_open_domain_stops_run(begin, monkeypatch, inside, ou
     p.position[:, 3] = 500.0, inside
     simulation.watchdog.check(simulation)
     p.position[1, 3] = outside
-    with pytest.raises(NumericalError, match=f"is lost: its y = {outside:g} ") as caught:
+    with pytest.raises(NumericalError, match=f"is at y = {outside:g}, outside") as caught:
         simulation.watchdog.check(simulation)
     assert caught.value.particle == p.id[3]
     monkeypatch.setattr(watchdog.Watchdog, "_check_fences", lambda *_: None)
@@ -276,7 +276,7 @@ def test_collapsing_step_stops_run(begin, monkeypatch):
         return limit._replace(dt=1e-9 * limit.dt)
 
     monkeypatch.setattr(step_size, "limit", shrunk)
-    with pytest.raises(NumericalError, match=r"time step has collapsed to .* sets it by"):
+    with pytest.raises(NumericalError, match=r"time step has collapsed to .*, limited by particle"):
         run(simulation, math.inf)
     assert simulation.step < 25 + 41  # within two windows
     monkeypatch.setattr(watchdog.Watchdog, "_check_pace", lambda *_: None)
@@ -302,7 +302,7 @@ def test_pace_compared_with_best_so_far(begin):
     simulation = begin()
     after_windows(simulation, 1e-9, 2e-9, 1e-9)  # slow from the start
     after_windows(simulation, 1.0, 1e-3, 2e-6)
-    with pytest.raises(NumericalError, match=r"collapsed to 0\.001: it may not grow faster"):
+    with pytest.raises(NumericalError, match=r"collapsed to 0\.001, limited by the largest growth"):
         after_windows(simulation, 1.0, 1e-4, 1e-8)
 
 
@@ -311,7 +311,9 @@ def test_step_too_small_to_advance_time_stops_run(begin, monkeypatch):
     simulation.advance(math.inf)
     allowed = step_size.limit
     monkeypatch.setattr(step_size, "limit", lambda *a: allowed(*a)._replace(dt=1e-30))
-    with pytest.raises(NumericalError, match=r"fell to 1e-30.* sets it by the speed of its"):
+    with pytest.raises(
+        NumericalError, match=r"fell to 1e-30.* limited by particle .*\(signal speed\)"
+    ):
         simulation.advance(math.inf)
     monkeypatch.setattr(watchdog.Watchdog, "_check_numbers", lambda *_: None)
     time = simulation.time
@@ -408,7 +410,7 @@ LIQUID = "physics.eos={ name = 'stiffened_gas', gamma = 4.4, p_inf = 1.0 }"
 
 def test_liquid_under_tension_stops_run_naming_particle(begin):
     # at a free end the density sum finds half of the neighbours: a tension of 0.4 x 4.4 p_inf
-    with pytest.raises(NumericalError, match="particle 61 is pulled apart") as error:
+    with pytest.raises(NumericalError, match="particle 61 is under more tension") as error:
         begin(LIQUID, boundary="open")
     assert error.value.particle == 61
     run(begin(LIQUID))
@@ -441,13 +443,13 @@ end = 0.1
         ("problem.masses=[1.0,1.0,1e-150,1.0]", "mass of particle 3 .* 1e-150"),
         ("problem.internal_energies=1e300", "internal energy of particle 1"),
         ("problem.positions=[[-0.3],[0.0],[0.1],[-1e200]]", "position of particle 4"),
-        ("problem.domain=[-1e200,1e200]", r"domain is 2e\+200 long in x"),
-        ("problem.domain=[-1e-200,1e-200]", "domain is 2e-200 long in x"),
+        ("problem.domain=[-1e200,1e200]", r"along x is 2e\+200"),
+        ("problem.domain=[-1e-200,1e-200]", "along x is 2e-200"),
         ("time.end=1e-320", r"time\.end is 9\.99989e-321"),
     ],
 )
 def test_values_beyond_range_refused_before_first_evaluation(begin, override, words):
-    with pytest.raises(NumericalError, match=words + r"[\s\S]*Try: code units"):
+    with pytest.raises(NumericalError, match=words + r"[\s\S]*Try: other code units"):
         begin(override, text=CLOUD)
 
 
@@ -490,13 +492,16 @@ def test_overflowing_sum_distinguished_from_tiny_step(begin, key, words):
     simulation = begin()
     getattr(simulation.particles, key)[..., 7] = 1e200 if key == "velocity" else 1.7e308
     simulation.particles.mass[7] = 1e3
-    with np.errstate(all="ignore"), pytest.raises(NumericalError, match=f"all {words} energy"):
+    with (
+        np.errstate(all="ignore"),
+        pytest.raises(NumericalError, match=f"total {words} energy is not"),
+    ):
         simulation._measure(past=None)
 
 
 def test_run_far_too_slow_to_finish_stops(begin, monkeypatch):
     monkeypatch.setattr(watchdog, "WINDOW", 20)
-    with pytest.raises(NumericalError, match="will not come to its end"):
+    with pytest.raises(NumericalError, match="cannot reach"):
         run(begin("physics.C=1e-17"))
     monkeypatch.setattr(watchdog.Watchdog, "_check_pace", lambda *_: None)
     simulation = begin("physics.C=1e-17")
@@ -507,5 +512,5 @@ def test_run_far_too_slow_to_finish_stops(begin, monkeypatch):
 
 def test_extreme_values_without_range_check_give_misleading_error(begin, monkeypatch):
     monkeypatch.setattr(watchdog.Watchdog, "check_range", lambda *_: None)
-    with pytest.raises(NumericalError, match="no support holds enough neighbours"):
+    with pytest.raises(NumericalError, match="no support radius contains enough neighbours"):
         begin("problem.velocities=[[0.0],[1e155],[0.0],[0.0]]", text=CLOUD)

@@ -11,6 +11,7 @@ from sph.analysis.figures.sources import Source, State, find_source, labels
 from sph.errors import ConfigError
 from sph.output.files import explained, refuse_link, replacing
 from sph.output.history import read as read_history
+from sph.output.run_directory import RunDirectory
 
 FORMATS = ("png", "pdf", "svg")
 MOST_TIMES = 6
@@ -66,15 +67,14 @@ def _shows_profiles(state: State) -> bool:
 
 def _draw_own(source: Source) -> list[Path]:
     """The pictures of one source, where they belong."""
-    if not source.is_run:
-        directory = source.path.parent if source.run is None else source.run.figures
+    run = source.run
+    if run is None or not source.is_run:
+        directory = source.path.parent if run is None else run.figures
         return [_save(main_picture(source.last()), directory / f"{source.path.stem}.png")]
-    return [
-        _save(picture, source.run.figures / f"{name}.png") for name, picture in _pictures(source)
-    ]
+    return [_save(picture, run.figures / f"{name}.png") for name, picture in _pictures(source, run)]
 
 
-def _pictures(source: Source):
+def _pictures(source: Source, run: RunDirectory):
     """(name, figure) of each picture of a run's set, one at a time to hold one in memory."""
     last = source.last()
     states = source.over_time(MOST_TIMES)
@@ -85,8 +85,8 @@ def _pictures(source: Source):
     else:
         yield "slice" if last.dimension == 3 else "map", maps.single(last)
         yield "evolution", maps.over_time(states)
-    if source.run.history.exists():
-        steps = read_history(source.run.history)
+    if run.history.exists():
+        steps = read_history(run.history)
         if steps["t"].size:
             theory = truth.theory(last.checkpoint.config, steps["t"])
             yield "history", history.figure(steps, last.title, theory)

@@ -1,5 +1,7 @@
 """What a run kept and what its steps were, from its history."""
 
+import itertools
+
 import numpy as np
 from matplotlib.figure import Figure
 
@@ -15,7 +17,7 @@ ENERGIES = (
 LABELS = {"volume_ratio": r"$\sum m/\rho$ over the volume"}
 DECADE = 10.0  # a column that spans more is drawn on a logarithmic axis
 STYLES = ("-", "--", "-.")
-LIMITERS = dict(zip(CRITERIA, (*style.PALETTE, "#999999", "#882255", "black"), strict=True))
+COLOURS = (*style.PALETTE, "black", "#999999", "#882255", "#44aa99", "#ddcc77")
 
 
 def figure(
@@ -75,10 +77,12 @@ def _momentum(panel, history, names) -> None:
 
 
 def _steps(panel, history) -> None:
-    for limiter, colour in LIMITERS.items():
-        by = history["limiter"] == limiter
-        if not by.any():
+    there = set(history["limiter"])
+    limiters = (*CRITERIA, *sorted(there.difference(CRITERIA)))  # those of parts after the others
+    for limiter, colour in zip(limiters, itertools.cycle(COLOURS), strict=False):
+        if limiter not in there:
             continue
+        by = history["limiter"] == limiter
         panel.plot(
             history["t"][by], history["dt"][by], ".", ms=3, mew=0, color=colour,
             label=limiter.replace("_", " "), rasterized=True,

@@ -67,7 +67,7 @@ def _exact_along(state: State, at: np.ndarray) -> dict[str, np.ndarray]:
         return {}
     position = np.repeat(state.problem.centre[:, None], at.size, axis=1)
     position[0] = position[0] + at if state.is_radial else at
-    exact = state.exact(position)
+    exact = state.exact(position) or {}
     holds = truth.within(state.problem, state.eos, state.time, position)
     fields = exact | {"velocity": exact["velocity"][0]}
     return {name: np.where(holds, values, np.nan) for name, values in fields.items()}

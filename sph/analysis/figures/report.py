@@ -1,6 +1,5 @@
 """Pictures of a report: error against cost, error against N, and where the time goes."""
 
-import io
 import math
 import re
 from collections.abc import Callable, Sequence
@@ -9,13 +8,11 @@ from pathlib import Path
 import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, NullFormatter
-from PIL import Image
 
 from sph.analysis.figures import style
 from sph.analysis.figures.report_labels import order, power, short, tick, value_alone
 from sph.analysis.figures.report_phases import phases
 from sph.analysis.report.compare import COSTS, Report, Series
-from sph.output.files import replacing
 
 MARKERS = "osD^vP*X"
 FRONT = "0.75"
@@ -30,7 +27,10 @@ LEGEND_SHARE = 0.055  # of a panel's height for a line of the legend within it
 def draw(report: Report, directory: Path) -> list[Path]:
     """Write the pictures; returns the files. Raises FileError."""
     with style.paper():
-        return [_save(picture, directory / f"{name}.png") for name, picture in _pictures(report)]
+        return [
+            style.save_png(picture, directory / f"{name}.png", bbox_inches="tight")
+            for name, picture in _pictures(report)
+        ]
 
 
 def _pictures(report: Report):
@@ -66,7 +66,7 @@ def error_against_number(report: Report) -> Figure:
 
 def _figure(report: Report, x, label: str, note: Callable[[Series], str], slopes, under=None):
     """One panel with its legend below, or a panel for each sweep with legends within."""
-    sweeps = {line.sweep: [] for line in report.series}
+    sweeps: dict[str, list[Series]] = {line.sweep: [] for line in report.series}
     for line in report.series:
         sweeps[line.sweep].append(line)
     several = len(sweeps) > 1
@@ -127,7 +127,7 @@ def _error_label(report: Report) -> str:
 
 
 def _title(report: Report) -> str:
-    problems = sorted({row.summary["problem"].replace("_", " ") for row in report.rows})
+    problems = sorted({row.ended["problem"].replace("_", " ") for row in report.rows})
     dimension = _dimension(report)
     return ", ".join(problems) + (f", {dimension}-D" if dimension else "")
 
@@ -223,16 +223,5 @@ def _legend_below(picture: Figure, panel) -> None:
 
 def _dimension(report: Report) -> int | None:
     """That of all runs, or None where they differ."""
-    found = {row.summary["dimension"] for row in report.rows}
+    found = {row.ended["dimension"] for row in report.rows}
     return found.pop() if len(found) == 1 else None
-
-
-def _save(figure: Figure, path: Path) -> Path:
-    """As a PNG of at most 256 colours: lines on white need no more, and a third of the bytes."""
-    drawn = io.BytesIO()
-    figure.savefig(drawn, format="png", bbox_inches="tight")
-    with replacing(path) as unfinished, Image.open(drawn) as image:
-        image.convert("RGB").quantize(256, dither=Image.Dither.NONE).save(
-            unfinished, format="png", optimize=True
-        )
-    return path

@@ -6,7 +6,7 @@ from matplotlib.figure import Figure
 from sph.analysis.figures import style
 from sph.analysis.figures.report_labels import short
 from sph.analysis.report.compare import Report, Series
-from sph.analysis.report.runs import STARTING
+from sph.clock import STARTING
 
 MOST_BARS = 24
 
@@ -51,8 +51,7 @@ def _bar_labels(report: Report, line: Series):
 
 
 def _seconds(row) -> dict[str, float]:
-    """CPU seconds of the last session by phase, without compiling and starting."""
-    session = row.summary["cost"]["session"]
+    """CPU seconds of the last session by phase."""
+    session = row.ended["cost"]["session"]
     found = {name: s for name, s in session["phases_cpu_seconds"].items() if name != STARTING}
-    apart = session["compile_cpu_seconds"] + session["phases_cpu_seconds"].get(STARTING, 0.0)
-    return found | {"other": max(0.0, session["cpu_seconds"] - apart - sum(found.values()))}
+    return found | {"other": max(0.0, session["cpu_seconds"] - sum(found.values()))}

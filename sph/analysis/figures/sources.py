@@ -63,8 +63,8 @@ def find_source(path: Path) -> Source:
         if not found:
             raise FileError(f"{path} has no checkpoints, so there is nothing to draw.")
         return Source(path, run, found)
-    run, path = find(path)
-    return Source(path, run, (path,))
+    home, path = find(path)
+    return Source(path, home, (path,))
 
 
 def labels(sources: Sequence[Source]) -> list[str]:

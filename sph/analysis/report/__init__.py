@@ -1,4 +1,4 @@
-"""Many runs compared: error against cost, as a table, in words and in pictures."""
+"""Comparison of many runs: error against cost, as a table, in words and in figures."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -12,10 +12,10 @@ __all__ = ["COSTS", "Question", "Report", "Series", "in_words", "make", "write"]
 
 
 def make(sources: Sequence[Path], question: Question) -> Report:
-    """The runs in `sources` compared, but for the one that is the reference.
+    """The comparison of the runs in `sources`, without the reference itself.
 
-    Raises FileError for what is missing or cannot be read, ConfigError for a field or key that no
-    run has and for a reference that does not fit.
+    Raises FileError for files that are missing or cannot be read, ConfigError for a field or key
+    that no run has, and for a reference that does not fit.
     """
     rows = runs.read(sources)
     if question.reference is not None:
@@ -37,7 +37,7 @@ def _against(path: Path, rows: Sequence[runs.Row]) -> list[runs.Row]:
 
 
 def in_words(report: Report) -> str:
-    """The table and what it says, for the terminal."""
+    """The table and its findings, for the terminal."""
     return f"{table.as_text(report)}\n\n" + "\n".join(words.sentences(report))
 
 
@@ -45,7 +45,7 @@ def write(report: Report, directory: Path) -> list[Path]:
     """Write table, words and pictures into `directory`; returns the files. Raises FileError."""
     from sph.analysis.figures import report as pictures
 
-    if directory.name == "report":  # its usual place, in a directory that may be a stranger's
+    if directory.name == "report":  # the default, in a directory that may belong to another user
         refuse_link(directory)
     with explained(f"cannot write to {directory}"):
         directory.mkdir(parents=True, exist_ok=True)
@@ -66,13 +66,13 @@ def _check(rows: Sequence[runs.Row], question: Question) -> None:
     there = dict.fromkeys(name for row in ended for name in row.figures())
     if ended and question.field not in there:
         raise ConfigError(
-            f"--field {question.field}: no run has such an error; there are "
+            f"--field {question.field}: no run has this error. Expected one of "
             f"{', '.join(there)}.\nTry: one of these, or --reference DIR, a finer run."
         )
     keys = {key for row in rows for key in row.settings}
     unknown = [key for key in question.by if key not in keys]
     if unknown:
         raise ConfigError(
-            f"--by {unknown[0]}: no run has such a key; what varies is "
+            f"--by {unknown[0]}: no run has this key. Keys that vary: "
             f"{', '.join(runs.varied_keys(ended)) or 'nothing'}."
         )

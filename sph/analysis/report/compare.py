@@ -1,4 +1,4 @@
-"""The comparison itself: lines of runs that differ in N, the front, and fitted orders."""
+"""The comparison: series of runs that differ in N, the Pareto front, and fitted orders."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -11,7 +11,7 @@ from sph.analysis.report.runs import Row, natural, varied_keys
 
 RESOLUTION = "problem.n"
 
-# What a cost is called: in a sentence, as a column, and its unit.
+# Names of a cost, in a sentence and as a column, and its unit.
 COSTS = {
     "cpu": ("CPU time", "CPU s", "s"),
     "wall": ("wall-clock time", "wall s", "s"),
@@ -21,12 +21,12 @@ COSTS = {
 
 
 class Question(NamedTuple):
-    """What a report is to compare."""
+    """What a report compares."""
 
     field: str = "density"  # of the errors, or table.name of a figure of the summary
     norm: str = "L1"
     cost: str = "cpu"  # a key of COSTS
-    by: tuple[str, ...] = ()  # keys that tell lines apart; all that vary but N if empty
+    by: tuple[str, ...] = ()  # keys that distinguish lines; empty: all that vary but N
     reference: Path | None = None  # the run that errors are taken against, if one is
 
     @property
@@ -35,21 +35,18 @@ class Question(NamedTuple):
 
 
 class Series(NamedTuple):
-    """Runs with errors that share their settings but N, in order of N: one line of a picture.
-
-    Where several sweeps are compared, a line is of one of them.
-    """
+    """Runs of one sweep that differ in N alone, in order of N: one line of a figure."""
 
     sweep: str  # empty where there is one
     label: str
-    group: str  # lines of one group, by --by, have one colour
+    group: str  # by --by; lines of one group have one colour
     members: tuple[int, ...]  # indices into the report's compared rows
     order: float | None  # p of error ~ spacing^p, spacing ~ N^(-1/D)
     exponent: float | None  # of error ~ cost^exponent
 
 
 class Report(NamedTuple):
-    """Runs with an error, in order of their series, and those without one."""
+    """Runs with an error, in order of their series, and runs without one."""
 
     question: Question
     keys: list[str]  # what varies
@@ -57,7 +54,7 @@ class Report(NamedTuple):
     error: np.ndarray  # (M,)
     cost: np.ndarray  # (M,)
     on_front: np.ndarray  # (M,) mask
-    excess: np.ndarray  # (M,) cost over the front's at the same error
+    excess: np.ndarray  # (M,) cost over the cost of the front at the same error
     series: list[Series]
     without: list[Row]
 
@@ -104,7 +101,7 @@ def _lines(rows: list[Row], keys: list[str], question: Question) -> list[_Line]:
 
 
 def _line_keys(keys: list[str], by: Sequence[str]) -> tuple[list[str], list[str]]:
-    """Keys that tell lines apart, and those that tell their colours apart."""
+    """Keys that distinguish lines, and keys that distinguish their colours."""
     if RESOLUTION in by:
         return list(by), list(by)
     lines = [key for key in keys if key != RESOLUTION]
@@ -120,7 +117,7 @@ def _label(row: Row, keys: Sequence[str]) -> str:
 def _series(line: _Line, which, error, cost) -> Series:
     number = np.array([row.n for row in line.rows], dtype=float)
     by_number = front.slope(number, error[which])
-    dimensions = {row.summary["dimension"] for row in line.rows}
+    dimensions = {row.ended["dimension"] for row in line.rows}
     order = None
     if by_number is not None and len(dimensions) == 1:
         order = -by_number * dimensions.pop()

@@ -1,6 +1,6 @@
-"""Which runs are the cheapest at their error, by how much others are not, and how fast errors fall.
+"""The Pareto front of cost and error, the distance of runs from it, and fitted exponents.
 
-Everything here works on arrays of positive costs and errors of one kind, one entry a run.
+All functions take arrays of positive costs and errors, one entry a run.
 """
 
 import numpy as np
@@ -12,14 +12,15 @@ def on_front(cost: np.ndarray, error: np.ndarray) -> np.ndarray:
     as_cheap = cost[None, :] <= cost[:, None]
     better = error[None, :] < error[:, None]
     as_good = error[None, :] <= error[:, None]
-    return ~((cheaper & as_good) | (as_cheap & better)).any(axis=1)
+    is_beaten = (cheaper & as_good) | (as_cheap & better)
+    return ~np.any(is_beaten, axis=1)
 
 
 def cost_at(error: float, front_cost: np.ndarray, front_error: np.ndarray) -> float:
-    """What the front takes for `error`, between its runs along straight lines of the logarithms.
+    """Cost of the front at `error`, interpolated between its runs in the logarithms of both.
 
-    An error above all of the front's takes its cheapest run: what less accuracy would cost is not
-    known, and this is an upper bound of it. Raises ValueError for an error below all of them.
+    For an error above all errors of the front this is the cost of its cheapest run, an upper bound.
+    Raises ValueError for an error below all of them.
     """
     if error < front_error.min():
         raise ValueError(f"the front does not reach an error of {error}")

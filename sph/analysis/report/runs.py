@@ -1,6 +1,6 @@
 """Run directories as rows of a table: their settings, errors and costs."""
 
-import json
+import math
 import os
 import re
 import tomllib
@@ -14,69 +14,74 @@ from sph.config.toml_text import value_text
 from sph.errors import FileError
 from sph.output.files import read_text
 from sph.output.run_directory import RunDirectory
+from sph.summary import Errors, Summary, lookup, wall_without_start
 from sph.sweep.manifest import SweepDirectory
-
-# Seconds of a run that are not spent on the gas, nor grow with it.
-STARTING = "start of Numba"
 
 
 @dataclass
 class Row:
-    """One run, or one that did not come to be."""
+    """One run, or a point of a sweep without a run."""
 
     path: Path
     name: str
     settings: dict[str, Any]  # every key of the resolved configuration but [run], as table.key
-    summary: dict[str, Any]
+    summary: Summary | None  # None before the run has ended
     status: str  # "done", "stopped", "failed" or "unfinished"
     reason: str = ""
-    reference: dict | None = None  # errors against a named run, in place of the summary's own
-    sweep: str = ""  # which of several sweeps it is of
+    reference: Errors | None = None  # errors against a named run, in place of the summary's own
+    sweep: str = ""  # the name of its sweep, where several are compared
     n: int = field(init=False)
+    steps: int = field(init=False)
     cost: dict[str, float] = field(init=False)  # by the names of --x
 
     def __post_init__(self):
-        self.n = self.summary.get("particles", 0)
+        self.n = self.summary["particles"] if self.summary else 0
+        self.steps = self.summary["steps"] if self.summary else 0
         self.cost = _cost(self.summary) if self.summary else {}
 
     @property
+    def ended(self) -> Summary:
+        """The summary of a run that has ended, as all runs with an error have."""
+        assert self.summary is not None
+        return self.summary
+
+    @property
     def is_restarted(self) -> bool:
-        """Whether earlier sessions are in its cost, of which the compile time is not known."""
-        return bool(self.summary) and self.summary["cost"]["session"]["steps"] < self.steps
+        """Whether its wall-clock seconds contain the start of earlier sessions."""
+        return self.summary is not None and self.summary["cost"]["session"]["steps"] < self.steps
+
+    @property
+    def errors(self) -> Errors | None:
+        """Its errors, against the reference of the report or else those of its summary."""
+        return self.reference or (self.summary["errors"] if self.summary else None)
 
     @property
     def truth(self) -> str | None:
         """The run that its errors are against, or None where that is the exact solution."""
-        return (self.reference or self.summary.get("errors") or {}).get("reference")
+        return self.errors.get("reference") if self.errors else None
 
     @property
     def warnings(self) -> list[str]:
         """The kinds of warning that it ended with."""
-        return warnings.kinds(self.summary)
-
-    @property
-    def steps(self) -> int:
-        return self.summary.get("steps", 0)
+        return warnings.kinds(self.summary or {})
 
     def error(self, name: str, norm: str) -> float | None:
         """The norm of a field's error, or the size of a figure given as table.name; or None."""
-        errors = self.reference or self.summary.get("errors") or {}
-        if "." not in name:
-            return _number(errors.get("fields", {}).get(name, {}).get(norm))
-        found: Any = self.summary
-        for step in name.split("."):
-            found = found.get(step) if isinstance(found, dict) else None
-        return _number(found)
+        if "." in name:
+            return _number(lookup(self.summary, name)) if self.summary else None
+        fields = self.errors["fields"] if self.errors else {}
+        return _number(lookup(fields, f"{name}.{norm}"))
 
     def figures(self) -> list[str]:
-        """Names of what `error` has a number for."""
-        errors = self.reference or self.summary.get("errors") or {}
-        tables = {name: self.summary.get(name) or {} for name in ("report", "conservation")}
-        further = [f"{table}.{name}" for table, names in tables.items() for name in names]
-        return [*errors.get("fields", {}), *further]
+        """The names of which `error` may have a number."""
+        names = [*self.errors["fields"]] if self.errors else []
+        if self.summary:
+            names += [f"report.{name}" for name in self.summary["report"] or {}]
+            names += [f"conservation.{name}" for name in self.summary["conservation"]]
+        return names
 
     def value(self, key: str) -> str:
-        """The value of a setting as it is shown."""
+        """The value of a setting, as tables show it."""
         if key not in self.settings:
             return "–"
         found = self.settings[key]
@@ -87,21 +92,21 @@ class Row:
 
 
 def read(sources: Sequence[Path]) -> list[Row]:
-    """The runs that are or lie in these directories. Raises FileError where there are none.
+    """The runs in these directories, which may be run directories. Raises FileError without runs.
 
-    Of more than one sweep, each row has the name of its own.
+    Rows have the name of their sweep where there is more than one.
     """
     rows: dict[Path, Row] = {}
     sources = list(dict.fromkeys(map(Path, sources)))
     sweeps = [source for source in sources if SweepDirectory(source).is_one]
     for source in sources:
-        found = _runs_in(source)
-        mine = {path.resolve(): _row(path) for path in found}
+        paths = _runs_in(source)
+        mine = {path.resolve(): _row(path) for path in paths}
         if source in sweeps:
             mine |= _never_begun(SweepDirectory(source))
             for row in mine.values() if len(sweeps) > 1 else ():
                 row.sweep = source.resolve().name
-        elif not found:
+        elif not paths:
             there = "holds no runs" if source.is_dir() else "does not exist"
             raise FileError(f"{source} {there}.\nTry: a run directory, or one that holds some.")
         rows |= mine
@@ -111,7 +116,7 @@ def read(sources: Sequence[Path]) -> list[Row]:
 
 
 def varied_keys(rows: Sequence[Row]) -> list[str]:
-    """Keys whose values differ, but for what only goes with problem.name, such as its own keys."""
+    """Keys whose values differ, without keys that differ only because the problem does."""
     keys = dict.fromkeys(key for row in rows for key in row.settings)
     by_problem: dict[str, Row] = {}
     for row in rows:
@@ -128,7 +133,7 @@ def varied_keys(rows: Sequence[Row]) -> list[str]:
 
 
 def _shorten_models(rows: Sequence[Row]) -> None:
-    """Leave a model's parameters out of the settings where no other run has others for it."""
+    """Leave the parameters of a model out of the settings where all runs agree in them."""
     models: dict[tuple[str, str], list[Row]] = {}
     for row in rows:
         for key, value in row.settings.items():
@@ -141,7 +146,7 @@ def _shorten_models(rows: Sequence[Row]) -> None:
 
 
 def _runs_in(directory: Path) -> list[Path]:
-    """`directory` if it is a run, else those in it, in the order a reader would count."""
+    """`directory` if it is a run, else the runs in it, in natural order (9 before 10)."""
     if _is_run(directory):
         return [directory]
     if not directory.is_dir():
@@ -173,16 +178,13 @@ def _row(path: Path) -> Row:
     except (OSError, ValueError, AttributeError, RecursionError) as error:
         raise FileError(f"{run.config} cannot be read: {error}") from None
     if not run.summary.exists():
-        return Row(path, path.name, settings, {}, "unfinished", "it has not ended")
-    try:
-        summary = json.loads(read_text(run.summary))
-        return Row(path, path.name, settings, summary, summary["status"], summary["reason"] or "")
-    except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
-        raise FileError(f"{run.summary} cannot be read: {error!r}") from None
+        return Row(path, path.name, settings, None, "unfinished", "it has not ended")
+    summary = run.whole_summary()
+    return Row(path, path.name, settings, summary, summary["status"], summary["reason"] or "")
 
 
 def _never_begun(sweep: SweepDirectory) -> dict[Path, Row]:
-    """Points of a sweep without a run: those that failed before they had one, and the rest."""
+    """Points of a sweep without a run directory: they failed at once, or have not started."""
     failures = sweep.failures()
     rows = {}
     for point in sweep.plan().points:
@@ -190,25 +192,23 @@ def _never_begun(sweep: SweepDirectory) -> dict[Path, Row]:
         if not _is_run(path):
             reason = failures.get(point.name)
             status = "unfinished" if reason is None else "failed"
-            rows[path] = Row(path, point.name, {}, {}, status, reason or "it was not begun")
+            rows[path] = Row(path, point.name, {}, None, status, reason or "not started")
     return rows
 
 
-def _cost(summary: dict) -> dict[str, float]:
-    """Cost by the names of --x: seconds without compiling and starting, updates, particles."""
-    cost = summary["cost"]
-    session = cost["session"]
-    apart = session["compile_cpu_seconds"] + session["phases_cpu_seconds"].get(STARTING, 0.0)
+def _cost(summary: Summary) -> dict[str, float]:
+    """Cost by the names of --x: two times without compilation and start, updates, particles."""
     return {
-        "cpu": cost["cpu_seconds"] - apart,
-        "wall": cost["wall_seconds"] - apart,  # both are the work of one thread
+        "cpu": summary["cost"]["cpu_seconds"],
+        "wall": wall_without_start(summary["cost"]),
         "updates": summary["particles"] * summary["steps"],
         "n": summary["particles"],
     }
 
 
 def _number(value: Any) -> float | None:
-    """Its size if it is a positive finite number: nothing else has a place on a log scale."""
-    if isinstance(value, bool) or not isinstance(value, int | float):
+    """The modulus of a finite number other than 0; None for all else: axes are logarithmic."""
+    is_number = isinstance(value, int | float) and not isinstance(value, bool)
+    if not is_number or not math.isfinite(value):
         return None
     return abs(float(value)) or None

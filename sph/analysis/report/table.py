@@ -3,16 +3,18 @@
 import csv
 import io
 from collections.abc import Sequence
+from typing import Any
 
 from sph.analysis.report.compare import COSTS, RESOLUTION, Report
 from sph.analysis.report.runs import Row
 from sph.output.json_text import json_text, null
+from sph.summary import lookup
 
 NORMS = ("L1", "L2", "Linf")
 
 
 def as_text(report: Report) -> str:
-    """Columns in line, for a terminal."""
+    """The table with aligned columns, for a terminal."""
     header, *lines = _cells(report)
     widths = [max(map(len, column)) for column in zip(header, *lines, strict=True)]
     return "\n".join(
@@ -22,7 +24,7 @@ def as_text(report: Report) -> str:
 
 
 def as_markdown(report: Report, sentences: Sequence[str], pictures: Sequence[str]) -> str:
-    """The table, the words, and the pictures that lie beside it."""
+    """The table, the sentences, and links to the figures in the same directory."""
     header, *lines = _cells(report)
     rule = ["---:"] * len(header)
     rows = ["| " + " | ".join(line) + " |" for line in (header, rule, *lines)]
@@ -33,7 +35,7 @@ def as_markdown(report: Report, sentences: Sequence[str], pictures: Sequence[str
 
 
 def as_csv(report: Report) -> str:
-    """A line a run, with all norms of all fields and all figures of its summary."""
+    """One line for each run: all norms of all fields, and all figures of its summary."""
     records = _records(report)
     columns = dict.fromkeys(name for record in records for name in record)
     text = io.StringIO()
@@ -44,7 +46,7 @@ def as_csv(report: Report) -> str:
 
 
 def as_json(report: Report, sentences: Sequence[str]) -> str:
-    """The question, the runs, the lines with their fits, and the words."""
+    """The question, the runs, the series with their fits, and the sentences."""
     runs = [row.name for row in report.rows]
     reference = report.question.reference
     series = [
@@ -68,7 +70,7 @@ def as_json(report: Report, sentences: Sequence[str]) -> str:
 
 
 def _cells(report: Report) -> list[list[str]]:
-    """Header and lines of what is shown."""
+    """The header and the lines of the table."""
     shown = [key for key in report.keys if key != RESOLUTION]
     question = report.question
     several = len({line.sweep for line in report.series}) > 1
@@ -82,16 +84,15 @@ def _cells(report: Report) -> list[list[str]]:
         line = [row.sweep] if several else []
         line += [*(row.value(key) for key in shown), str(row.n), str(row.steps)]
         line += [] if question.cost == "n" else [f"{report.cost[i]:.3g}"]
-        drift = row.summary["conservation"]["energy_drift_max"]
-        drifted = f"{drift:.1e}" if isinstance(drift, float) else str(drift)
+        drift = row.ended["conservation"]["energy_drift_max"]
         against = "front" if report.on_front[i] else f"× {report.excess[i]:.2f}"
-        line += [f"{report.error[i]:.3g}", drifted, against]
+        line += [f"{report.error[i]:.3g}", f"{drift:.1e}", against]
         lines.append([*line, ", ".join(row.warnings) or "–"] if warned else line)
     return [header, *lines]
 
 
 def _records(report: Report) -> list[dict]:
-    """All there is of every run, also of those without an error, by column."""
+    """All figures of every run, also of runs without an error, by column."""
     found = zip(
         report.error.tolist(), report.excess.tolist(), report.on_front.tolist(), strict=True
     )
@@ -103,7 +104,7 @@ def _records(report: Report) -> list[dict]:
 
 
 def _record(report: Report, row: Row) -> dict:
-    record = {"sweep": row.sweep} if row.sweep else {}
+    record: dict[str, Any] = {"sweep": row.sweep} if row.sweep else {}
     record |= {"run": row.name, "status": row.status, "reason": row.reason}
     record |= {key: row.value(key) for key in report.keys}
     if not row.summary:
@@ -121,8 +122,7 @@ def _record(report: Report, row: Row) -> dict:
     }
     for name in row.figures():
         if "." in name:
-            table, key = name.split(".")
-            record[name] = row.summary[table][key]
+            record[name] = lookup(row.summary, name)
         else:
             record |= {f"{name}_error.{norm}": row.error(name, norm) for norm in NORMS}
     return record

@@ -1,18 +1,18 @@
-"""What a report says in sentences."""
+"""The findings of a report, in sentences."""
 
 from pathlib import Path
 
 import numpy as np
 
 from sph.analysis.report.compare import COSTS, Report, Series
-from sph.analysis.report.runs import STARTING, Row
+from sph.analysis.report.runs import Row
 
-# CPU times of equal runs differ by some per cent, more on a machine that is shared.
+# CPU times of equal runs differ by a few per cent, more on a shared machine.
 LEVEL = 1.1
 
 
 def sentences(report: Report) -> list[str]:
-    """How errors fall, what is on the front, what is dominated by how much, and what to know."""
+    """Orders of convergence, the Pareto front, the distance of other lines from it, and caveats."""
     said = [_costs(report)]
     if report.rows:
         said += [_order(line) for line in report.series if line.order is not None]
@@ -31,7 +31,7 @@ def _costs(report: Report) -> str:
     against = f" against the run {Path(named).name}" if named is not None else ""
     text = f"Compared: {question.error_name}{against}, weighed with {COSTS[question.cost][0]}"
     if question.cost in ("cpu", "wall"):
-        text += f" without compilation and {STARTING.replace('start', 'the start')}"
+        text += " without compilation and the start of Numba"
     return text + "."
 
 
@@ -50,7 +50,7 @@ def _front(report: Report) -> str:
 
 
 def _standing(report: Report, line: Series) -> str:
-    """How far a line is from the front where it is not on it."""
+    """The cost of a line over the cost of the front, where the line is not on it."""
     off = [i for i in line.members if not report.on_front[i]]
     factors = report.excess[off]
     never = len(off) == len(line.members)
@@ -72,28 +72,28 @@ def _warnings(report: Report) -> list[str]:
     if warned:
         said.append(f"Ended with warnings (hollow in the pictures): {'; '.join(warned)}.")
     restarted = [row.name for row in report.rows if row.is_restarted]
-    if restarted and report.question.cost in ("cpu", "wall"):
+    if restarted and report.question.cost == "wall":
         said.append(
-            f"Restarted, so their time includes what their first sessions took to start: "
-            f"{', '.join(restarted)}."
+            "Restarted, so the time contains compilation and the start of Numba in earlier "
+            f"sessions: {', '.join(restarted)}."
         )
     for row in (*report.rows, *report.without):
-        if changed := row.summary.get("settings_changed"):
-            said.append(f"{row.name} changed its settings on the way: {'; '.join(changed)}.")
+        if row.summary and (changed := row.summary["settings_changed"]):
+            said.append(f"{row.name} changed its settings in restarts: {'; '.join(changed)}.")
     truths = dict.fromkeys(row.truth for row in report.rows)
     if len(truths) > 1 and "." not in report.question.field:
         told = (f"the run {Path(one).name}" if one else "the exact solution" for one in truths)
-        said.append(f"Errors are not all against the same: some are against {', '.join(told)}.")
+        said.append(f"Errors differ in what they are against: {', '.join(told)}.")
     different = [key for key in ("problem.name", "problem.dimension", "time.end")
                  if key in report.keys]  # fmt: skip
     if different:
-        said.append(f"These are different tasks ({', '.join(different)}): one front for all is "
-                    "to be read with care.")  # fmt: skip
+        said.append(f"The runs differ in {', '.join(different)}: compare their costs with "
+                    "care.")  # fmt: skip
     return said
 
 
 def _name(line: Series) -> str:
-    """Its label, with its sweep unless that is named like what it varies."""
+    """The label of a line, with its sweep unless the label says it."""
     sweep = "" if line.label.startswith(f"{line.sweep} = ") else line.sweep
     return ": ".join(filter(None, [sweep, line.label])) or "These runs"
 
@@ -109,7 +109,7 @@ def _is_all_front(report: Report, line: Series) -> bool:
 
 def _reason(report: Report, row: Row) -> str:
     if row.status == "done":
-        left_out = row.summary.get("errors_left_out")
+        left_out = row.summary and row.summary["errors_left_out"]
         why = f": {left_out}" if left_out and "." not in report.question.field else ""
         return f"it has no {report.question.error_name}{why}"
     return ": ".join(filter(None, [row.status, row.reason.partition("\n")[0]]))

@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
+from states import gas_state
 
 from sph import config
 from sph.analysis import errors
-from sph.particles import Particles
 
 ROUND_OFF = 1e-13  # sums of at most some hundred terms of order 1
 
@@ -42,9 +42,7 @@ def tube():
     low, high = problem.box[:, :1], problem.box[:, 1:]
     position = low + (high - low) * random.random((2, 200))
     exact = problem.exact(eos, 0.1, position)
-    particles = Particles.at_start(
-        position, exact["velocity"], np.full(200, 0.01), exact["internal_energy"]
-    )
+    particles = gas_state(position, exact["velocity"], np.full(200, 0.01), exact["internal_energy"])
     particles.density[:] = exact["density"]
     return made, particles, exact["pressure"].copy()
 

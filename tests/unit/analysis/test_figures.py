@@ -5,6 +5,7 @@ import shutil
 import numpy as np
 import pytest
 from matplotlib.image import imread
+from states import gas_state
 
 from sph import config, kernels, registry
 from sph.analysis import errors, figures
@@ -16,7 +17,6 @@ from sph.output import checkpoint
 from sph.output.history import History
 from sph.output.history import read as read_history
 from sph.output.run_directory import RunDirectory
-from sph.particles import Particles
 
 SMALL = {"shock_tube": 60, "point_explosion": 512, "particles": 4}
 SETS = {
@@ -40,7 +40,7 @@ def state_of(problem: str, *overrides: str, time: float | None = None) -> State:
     time = made.time.end if time is None else time
     eos = made.physics.eos_model()
     start = made.problem.initial(eos)
-    particles = Particles.at_start(*start)
+    particles = gas_state(*start)
     volume = np.prod(made.problem.box[:, 1] - made.problem.box[:, 0])
     wave = 1.0 + 0.3 * np.cos(2.0 * np.pi * particles.position[-1])
     particles.density[:] = particles.mass.sum() / volume * wave

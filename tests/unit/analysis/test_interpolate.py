@@ -2,30 +2,29 @@
 
 import numpy as np
 import pytest
+from states import gas_state
 
 from sph import kernels
-from sph.analysis.interpolate import Plane, onto_plane
+from sph.analysis.interpolate import Plane, at_points, onto_plane
 from sph.domain import Domain
-from sph.particles import Particles
+from sph.state import State
 
 KERNEL = kernels.make("wendland_c2")
 # Sums of some hundred positive terms, in any order.
 ROUND_OFF = 1e-12
 
 
-def gas(position, support, seed=0) -> Particles:
+def gas(position, support, seed=0) -> State:
     """Particles of random mass and density at (D, N) `position`."""
     random = np.random.default_rng(seed)
     n = position.shape[1]
-    particles = Particles.at_start(
-        position, np.zeros_like(position), 1.0 + random.random(n), np.ones(n)
-    )
+    particles = gas_state(position, np.zeros_like(position), 1.0 + random.random(n), np.ones(n))
     particles.density[:] = 1.0 + random.random(n)
     particles.support[:] = support
     return particles
 
 
-def random_gas(dimension, n=150, seed=0) -> Particles:
+def random_gas(dimension, n=150, seed=0) -> State:
     """In the unit box, with supports that vary by a factor 2."""
     random = np.random.default_rng(seed)
     return gas(random.random((dimension, n)), 0.2 + 0.2 * random.random(n), seed)
@@ -97,6 +96,19 @@ def test_interpolation_equals_explicit_sum(dimension, boundary, separation):
     plane = Plane.through_centre(domain.box, 6)
     (found,) = onto_plane(values[None], particles, domain, KERNEL, plane)
     expected = written_out(values, particles, separation, KERNEL, plane)
+    np.testing.assert_allclose(found, expected, rtol=0, atol=ROUND_OFF)
+
+
+@pytest.mark.parametrize("boundary", ["periodic", "mirror", "open"])
+@pytest.mark.parametrize("dimension", [2, 3])
+def test_interpolation_pixels_equal_points(dimension, boundary):
+    particles, domain = random_gas(dimension, n=40), unit_domain(dimension, boundary)
+    values = np.random.default_rng(5).normal(size=(2, 40))
+    plane = Plane.through_centre(domain.box, 6)
+    x, y = (centres.ravel() for centres in pixel_centres(plane))
+    points = np.stack([x, y, np.full(x.size, plane.height)][:dimension])
+    found, _ = at_points(values, particles.velocity, particles, domain, KERNEL, points)
+    expected = onto_plane(values, particles, domain, KERNEL, plane).reshape(2, -1)
     np.testing.assert_allclose(found, expected, rtol=0, atol=ROUND_OFF)
 
 

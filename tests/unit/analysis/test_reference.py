@@ -5,6 +5,7 @@ import json
 import numpy as np
 import pytest
 from click.testing import CliRunner
+from states import gas_state
 
 from sph import config as configuration
 from sph import runner
@@ -13,7 +14,6 @@ from sph.cli import main
 from sph.errors import ConfigError, FileError
 from sph.output.checkpoint import Checkpoint
 from sph.output.run_directory import RunDirectory
-from sph.particles import Particles
 from sph.progress import Lines
 
 # Sums of some hundred terms, in any order.
@@ -23,7 +23,7 @@ ROUND_OFF = 1e-12
 def state(dimension, boundary, n=120, seed=0) -> Checkpoint:
     """A checkpoint of random particles in the unit box, as `at_points` asks for it."""
     random = np.random.default_rng(seed)
-    particles = Particles.at_start(
+    particles = gas_state(
         random.random((dimension, n)),
         random.normal(size=(dimension, n)),
         1.0 + random.random(n),
@@ -94,7 +94,7 @@ def test_reference_fields_are_interpolated_by_kernel(dimension, boundary, images
 def test_reference_fields_in_chunks_equal(monkeypatch):
     one, points = state(2, "periodic"), np.random.default_rng(5).random((2, 30))
     whole = at_points(one, points)
-    monkeypatch.setattr("sph.analysis.reference.CHUNK", 7)
+    monkeypatch.setattr("sph.analysis.interpolate.CHUNK", 7)
     for name, values in at_points(one, points).items():
         assert values == pytest.approx(whole[name], rel=ROUND_OFF, abs=ROUND_OFF)
 
@@ -202,7 +202,7 @@ def test_errors_against_reference_and_exact_are_distinguished(
 ):
     sph_("run", config_with_reference, "-o", tmp_path / "run", "--set", "problem.n=60")
     said = sph_("report", tubes / "n=50", tmp_path / "run", "-o", tmp_path / "report").stdout
-    assert "Errors are not all against the same" in said
+    assert "Errors differ in what they are against" in said
     assert "Compared: L1 error of density, weighed" in said
 
 

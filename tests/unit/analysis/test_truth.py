@@ -16,16 +16,16 @@ PROBLEMS = registry.names("sph.problems")
 ENDS = {
     "walls": ("shock_tube", (), 0.5 / 1.75216, r"reaches the end at x = 0\.5"),
     "a periodic tube": (
-        "shock_tube", ("problem.boundary=periodic",), 0.25 / 1.75216, "meets that from the end",
+        "shock_tube", ("problem.boundary=periodic",), 0.25 / 1.75216, "meets the wave from the end",
     ),
     "an open tube": (
-        "shock_tube", ("problem.boundary=open",), 0.5 / (1.75216 + 1.05830), "meets that",
+        "shock_tube", ("problem.boundary=open",), 0.5 / (1.75216 + 1.05830), "meets the wave",
     ),
     # gas at -1 hits the lower wall, whose shock runs at Mach M, M^2 - 1.2 M/1.18322 - 1 = 0
     "a tube between walls that moves": (
         "shock_tube",
         ("problem.left.velocity=-1", "problem.right.velocity=-1"),
-        0.5 / (1.62830 * 1.18322 + 1.18322), r"meets that from the end at x = -0\.5",
+        0.5 / (1.62830 * 1.18322 + 1.18322), r"meets the wave from the end at x = -0\.5",
     ),
     "a tube that is open sideways": (
         "shock_tube", ("problem.dimension=2", "problem.boundary=['mirror', 'open']"), 0.0,
@@ -169,11 +169,11 @@ def test_error_region_excludes_waves_from_ends():
     low, high = -0.5 + 0.118322, 0.5 - 0.175216
     inside, words = truth.region(problem, eos, 0.1, x)
     np.testing.assert_array_equal(inside, ((low < x) & (x < high))[0])
-    assert words == "-0.3817 < x < 0.3248, where no wave from the domain's ends has come"
+    assert words == "-0.3817 < x < 0.3248, where no wave from the domain's ends has arrived"
     ranged = made("shock_tube", "problem.boundary=periodic", "problem.error_range=[-0.2, 0.4]")
     inside, words = truth.region(ranged.problem, eos, 0.1, x)
     np.testing.assert_array_equal(inside, ((x > -0.2) & (x < high))[0])
-    assert words.startswith("-0.2 < x < 0.4, of it -0.3817 < x < 0.3248")
+    assert words.startswith("-0.2 < x < 0.4, within -0.3817 < x < 0.3248")
     quiet = made("shock_tube", "problem.boundary=periodic", "problem.error_range=[-0.2, 0.3]")
     assert truth.region(quiet.problem, eos, 0.1, x)[1] == "-0.2 < x < 0.3"
 
@@ -260,4 +260,4 @@ def test_error_region_text_names_only_axes_with_ends():
         gas.problem, gas.physics.eos_model(), 0.1, np.array([[0.5, 0.5], [0.5, 0.1]])
     )
     assert inside.tolist() == [True, False]
-    assert words == "0.1183 < y < 0.8817, where no wave from the domain's ends has come"
+    assert words == "0.1183 < y < 0.8817, where no wave from the domain's ends has arrived"

@@ -6,8 +6,8 @@ import pytest
 
 from sph import config, registry
 from sph.errors import ConfigError, FileError
-from sph.viscosity import constant
-from sph.viscosity.switches import cullen_dehnen, morris_monaghan
+from sph.parts.viscosity import constant
+from sph.parts.viscosity.switches import cullen_dehnen, morris_monaghan
 
 KERNELS = ", ".join(f'"{name}"' for name in registry.names("sph.kernels"))
 MINIMAL = '[problem]\nname = "shock_tube"\n'

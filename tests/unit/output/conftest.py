@@ -2,10 +2,11 @@
 
 import numpy as np
 import pytest
+from states import gas_state
 
 from sph import config
 from sph.output.checkpoint import Checkpoint
-from sph.particles import Particles
+from sph.totals import Baseline, Budget
 
 DOMAIN = [[-0.5, 0.5], [0.0, 0.25], [-2.0, 2.0]]
 
@@ -30,7 +31,7 @@ def configured(dimension: int, boundary: str = "periodic", alpha=None) -> config
 def random_state(dimension=2, number=50, boundary="periodic", alpha=None, seed=1) -> Checkpoint:
     random = np.random.default_rng(seed)
     low, high = np.array(DOMAIN[:dimension]).T[:, :, None]
-    particles = Particles.at_start(
+    particles = gas_state(
         position=low + (high - low) * random.random((dimension, number)),
         velocity=random.normal(size=(dimension, number)),
         mass=random.random(number),
@@ -51,6 +52,7 @@ def random_state(dimension=2, number=50, boundary="periodic", alpha=None, seed=1
         list_skin=0.1,
         config=configured(dimension, boundary, alpha),
         lineage=("a first run", "résumé\nof it"),
+        budget=Budget(random.random(), random.random(), Baseline(*random.random(2).tolist())),
     )
 
 

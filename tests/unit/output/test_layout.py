@@ -129,7 +129,7 @@ def test_particle_datasets_match_state(public, make_state, alpha):
         assert group[name][()].tobytes() == array.tobytes(), name
     assert np.array_equal(group["Velocities"][:, :2], particles.velocity.T)
     assert not group["Velocities"][:, 2].any()
-    # H/h of Wendland C2 in 2-D as the seed prints it (eq 15), to its six digits
+    # H/h of Wendland C2 in 2-D (eq 110), to six digits
     h = particles.support / 1.897367
     np.testing.assert_allclose(group["SmoothingLengths"], h, rtol=5e-7)
 

@@ -37,7 +37,7 @@ def test_neighbours_in_either_support_nearest_first_across_faces(failed, tmp_pat
     assert [line.split()[:2] for line in lines] == [
         ["1", "0"], ["3", "0.04"], ["4", "0.07"], ["2", "0.35"],
     ]  # fmt: skip
-    assert last == "These are all its neighbours."
+    assert last == "(no further neighbours)"
     assert str(path) in where
 
 
@@ -45,7 +45,7 @@ def test_many_neighbours_are_counted_not_listed(failed, tmp_path):
     state = failed(np.linspace(-0.1, 0.1, 12), 0.3)
     words = offenders.leave(tmp_path / "offenders.h5", state, 4).splitlines()
     assert len(words) == 1 + offenders.SHOWN + 2
-    assert words[-2] == f"and {12 - offenders.SHOWN} more neighbours."
+    assert words[-2] == f"... and {12 - offenders.SHOWN} more neighbours."
 
 
 def test_particle_with_nan_position_listed_first_and_alone(failed, tmp_path):
@@ -66,4 +66,4 @@ def test_fault_without_particle_writes_no_offenders(failed, tmp_path):
 
 def test_unwritable_offenders_keep_original_error(failed, tmp_path):
     words = offenders.leave(tmp_path / "none" / "offenders.h5", failed([0.1], 0.2), 1)
-    assert "They could not be written: " in words
+    assert "could not be written: " in words

@@ -156,7 +156,7 @@ def test_checkpoint_of_other_run_is_refused(refused, run, state, make_state, num
         checkpoint.write(run.checkpoint_path(2), at_step(state, 4, lineage=("ours",)))
     checkpoint.write(run.checkpoint_path(number), others[what])
     facts = {"dimension": "problem.dimension", "alpha": "alpha = 3.0", "lineage": "lineage",
-             "particles": "particles"}  # fmt: skip
+             "particles": "particle"}  # fmt: skip
     refused(run, facts.get(what, "step"))
 
 

@@ -1,6 +1,5 @@
 """When a run counts as stable, by summaries and states made by hand."""
 
-import json
 from types import SimpleNamespace
 
 import numpy as np
@@ -50,19 +49,20 @@ class State:
 @pytest.fixture
 def finished_run(tmp_path, monkeypatch):
     """finished_run(name, state, ...): the directory of a run that ended with these figures."""
-    states = {}
+    states, summaries = {}, {}
+    monkeypatch.setattr(
+        criterion.RunDirectory, "whole_summary", lambda run: summaries[run.path.name]
+    )
     monkeypatch.setattr(criterion, "_last", lambda directory: states[directory.name])
 
     def made(name, state=None, errors=None, report=None, drift=1e-5, **changed):
         fields = errors and {field: {"L1": error} for field, error in errors.items()}
-        summary = {
+        summaries[name] = {
             "status": "done", "reason": None, "time": 0.5, "steps": 40,
             "errors": fields and {"fields": fields}, "report": report,
             "conservation": {"energy_drift": 0.0, "energy_drift_max": drift},
             "cost": {"cpu_seconds": 9.0, "session": {"compile_cpu_seconds": 4.0}},
         } | changed  # fmt: skip
-        (tmp_path / name).mkdir()
-        (tmp_path / name / "summary.json").write_text(json.dumps(summary))
         states[name] = state or State()
         return tmp_path / name
 
@@ -87,6 +87,14 @@ def test_energy_drift_limit_is_problem_limit_or_half_above_reference(
         assert (trial.verdict, trial.drift) == (verdict, share * allowed)
 
 
+def test_error_limits_of_problem_do_not_apply(finished_run):
+    """They hold for the shipped configuration, not for the same run with small steps."""
+    state = State(LIMITS | {"l1.density": Limit(1e-9, "-")})
+    judge = Judge(finished_run("reference", state, errors=dict.fromkeys(FIELDS, 0.1)), Criterion())
+    assert "l1.density" not in judge.figures
+    assert judge.errors["density"] == pytest.approx(0.15, rel=1e-12)
+
+
 def test_trial_reports_cost_of_run(finished_run):
     judge = Judge(finished_run("reference"), Criterion())
     trial = judge.trial(0.1, finished_run("run"))
@@ -95,7 +103,7 @@ def test_trial_reports_cost_of_run(finished_run):
         0.1,
         0.5,
         40,
-        5.0,
+        9.0,
     )
     failed = finished_run("failed", status="failed", reason="step 3: no\nTry: more")
     trial = judge.trial(0.2, failed)

@@ -211,8 +211,8 @@ def test_islands_of_stability_are_reported(first_search, tube):
     assert found.islands("largest") == []
     found.edges["largest"] = Edge(reference, default)  # as if the default were beyond
     assert found.islands("largest") == more
-    assert f"It is not one range: stable again at {more[0]:g}" in table.in_words(found)
-    assert "WHICH IS BEYOND" in table.in_words(found)
+    assert f"The range has gaps: stable again at {more[0]:g}" in table.in_words(found)
+    assert "THE CONFIGURATION IS UNSTABLE" in table.in_words(found)
 
 
 def changed(run, target, change):
@@ -305,9 +305,8 @@ def test_shortened_search_lists_skipped_runs(tmp_path):
     short = ("time.end=0.02",)
     found = command.run(path, "physics.C", short, tmp_path / "out", ("resolution=3",), 1)
     assert (found.end, found.whole_end) == (0.02, 0.05)
-    assert (
-        "runs to t = 0.02 of time.end = 0.05: the search says nothing of later times. "
-        in table.in_words(found)
+    assert "runs to t = 0.02 of time.end = 0.05: later times were not tested. " in table.in_words(
+        found
     )
 
 

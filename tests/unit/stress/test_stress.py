@@ -92,17 +92,15 @@ def test_suite_with_expected_verdicts_exits_with_0(stress, tmp_path):
     assert case["passes"]
     assert settings["right"]["verdict"] == "pass"
     assert {settings[name]["verdict"] for name in ("caught", "refused", "overflown")} == {
-        "fails as written"
+        "expected failure"
     }
-    assert settings["caught"]["reason"].startswith("fails because the density is 1 (")
-    assert "1 of 1 cases pass; 3 settings that are to fail were caught" in result.output
+    assert settings["caught"]["reason"].startswith("the density is 1 (")
+    assert "1 of 1 cases pass; 3 expected failures;" in result.output
     # the floor of the density sum of a lattice at eta = 1.6 in one dimension, 1.002456
     assert settings["right"]["reaches"]["errors.density.L1"]["value"] == pytest.approx(
         0.002456, abs=1e-6
     )
-    assert "still reaches errors.density.L1 = 0.00246 (right), where 0 would be right" in (
-        result.output
-    )
+    assert "still reaches errors.density.L1 = 0.00246 (right); exact: 0." in (result.output)
     assert "| still | right | grad_h | pass |" in (tmp_path / "out" / "stress.md").read_text()
 
 
@@ -111,8 +109,8 @@ def test_suite_with_expected_verdicts_exits_with_0(stress, tmp_path):
     ("more", "setting", "verdict"),
     [
         (IMPOSSIBLE, "impossible", "falls short"),
-        (UNEXPECTED, "unexpected", "passes, though written to fail"),
-        (OTHERWISE, "otherwise", "fails otherwise than written"),
+        (UNEXPECTED, "unexpected", "unexpected pass"),
+        (OTHERWISE, "otherwise", "unexpected failure"),
     ],
 )
 def test_case_with_unexpected_verdict_exits_with_3(stress, more, setting, verdict):
@@ -121,8 +119,8 @@ def test_case_with_unexpected_verdict_exits_with_3(stress, more, setting, verdic
     assert not case["passes"]
     assert settings["right"]["verdict"] == "pass"
     assert settings[setting]["verdict"] == verdict
-    assert "0 of 1 cases pass; 0 settings that are to fail were caught" in result.stderr
-    assert f"Short: still ({setting} {verdict})." in result.stderr
+    assert "0 of 1 cases pass; 0 expected failures;" in result.stderr
+    assert f"Not passed: still ({setting} {verdict})." in result.stderr
 
 
 @pytest.mark.slow

@@ -97,7 +97,7 @@ def test_worker_without_shared_files_is_reported(cluster, program, tmp_path, mon
     elsewhere = Task(SweepDirectory(tmp_path / "nowhere"), Point("a", ()), ())
     ours.run([elsewhere], cluster.scheduler_address, told.append)
     assert [one.status for one in told] == ["failed"]
-    assert "the sweep's files must be shared" in told[0].reason
+    assert "the files of a sweep must be shared" in told[0].reason
 
 
 def test_unreachable_scheduler_exits_with_4(program, tmp_path, monkeypatch):

@@ -109,7 +109,7 @@ def test_signal_stops_runs_with_checkpoint(number, program, tmp_path):
     process.send_signal(number)
     _, told = process.communicate(timeout=60)
     assert process.returncode == 75, told
-    assert "0 of 3 points are done; the same command goes on with the rest." in told
+    assert "0 of 3 points are done; the same command continues with the rest." in told
     assert "Traceback" not in told
     assert {name: summaries(path)[name]["status"] for name in first} == dict.fromkeys(
         first, "stopped"
@@ -144,7 +144,14 @@ def test_point_running_in_other_process_is_skipped(program):
     with task.log.open("ab") as held:
         fcntl.flock(held, fcntl.LOCK_EX)
         outcome = execute(task, stops=lambda: 1)
-        assert outcome == ("problem.n=40", "stopped", "another process is at it", "", 0, ())
+        assert outcome == (
+            "problem.n=40",
+            "stopped",
+            "another process is running this point",
+            "",
+            0,
+            (),
+        )
         found = []
         waiting = threading.Thread(target=lambda: found.append(execute(task)))
         waiting.start()
@@ -214,7 +221,7 @@ def test_sweep_reports_number_of_points_and_asks_above_bound(program, tmp_path, 
     arguments = ("--vary", "problem.n=40,50,60", "-o", tmp_path / "sweep")
     result = program.run(*arguments)
     assert result.exit_code == 2
-    assert "these are 3 points" in result.stderr
+    assert "the sweep has 3 points" in result.stderr
     assert "--yes" in result.stderr
     assert not (tmp_path / "sweep").exists()
     result = program.run(*arguments, "--yes")

@@ -1,0 +1,159 @@
+"""The table [physics]: the keys of every formulation, and those that parts declare."""
+
+import functools
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar
+
+from pydantic import Field, create_model, model_validator
+
+from sph import parts, registry
+from sph.config.choices import Choice, ModelChoice, labelled_table, plain
+from sph.config.restarts import FREE, RECORDED, REFUSED
+from sph.config.toml_text import value_text
+from sph.part import Key, Part
+from sph.problems.base import Section
+
+FORMULATIONS = "sph.formulations"
+DEFAULT = "gas"
+
+
+class Physics(Section):
+    """Equations and numerical method. All values are in code units."""
+
+    # The formulation and every part that can join it.
+    kinds: ClassVar[tuple[type[Part], ...]] = ()
+
+    if TYPE_CHECKING:  # the keys that parts declare
+
+        def __getattr__(self, name: str) -> Any: ...
+
+    formulation: Annotated[str, Choice(FORMULATIONS, folders=True)] = Field(
+        DEFAULT,
+        description="equations that are solved for density and rates",
+        json_schema_extra=REFUSED,
+    )
+    kernel: Annotated[Any, ModelChoice("sph.kernels")] = Field(
+        "wendland_c2",
+        description="smoothing kernel W, zero beyond the support radius H",
+        json_schema_extra=RECORDED,
+    )
+    gamma: Annotated[float, Field(gt=1)] | None = Field(
+        1.4,
+        description="adiabatic index of an ideal gas, the ratio of specific heats",
+        json_schema_extra=REFUSED,
+    )
+    eos: Annotated[Any, ModelChoice("sph.eos")] | None = Field(
+        None,
+        description="equation of state, given instead of gamma; an ideal gas with gamma if not "
+        "given",
+        examples=[{"name": "ideal_gas", "gamma": 1.4}],
+        json_schema_extra=REFUSED,
+    )
+    eta: float = Field(
+        1.6,
+        gt=0,
+        description="smoothing length h divided by the local particle spacing (m/rho)^(1/D), in D "
+        "dimensions; larger values give more neighbours",
+        json_schema_extra=RECORDED,
+    )
+    allow_pairing: bool = Field(
+        False,
+        description="allow a spline kernel at values of eta for which its particles form close "
+        "pairs (the pairing instability)",
+        json_schema_extra=RECORDED,
+    )
+    max_support: float = Field(
+        1.0,
+        gt=0,
+        description="upper limit of the support radius, in units of the longest side of the "
+        "domain; acts only where all axes are open, on particles with too few neighbours",
+        json_schema_extra=RECORDED,
+    )
+    C: float = Field(
+        0.15,
+        gt=0,
+        description="Courant number: the time step is C 2H/v_sig or less, with H the support "
+        "radius and v_sig the signal speed; reduced automatically where the leapfrog would be "
+        "unstable with the viscosity and the other dissipation of the run",
+        json_schema_extra=RECORDED,
+    )
+    energy_limit: bool = Field(
+        True,
+        description="limit the time step by C u/|du/dt|, with u the internal energy per unit "
+        "mass, so that fast changes of it are resolved",
+        json_schema_extra=RECORDED,
+    )
+    max_energy_drift: float = Field(
+        0.005,
+        gt=0,
+        description="largest relative error of total energy (energy drift); a run that exceeds it "
+        "stops with an error",
+        json_schema_extra=FREE,
+    )
+
+    @model_validator(mode="before")
+    @classmethod
+    def _gamma_gives_way(cls, data: Any) -> Any:
+        if isinstance(data, dict) and data.get("eos") is not None:
+            return {"gamma": None} | data
+        return data
+
+    def kernel_model(self):
+        """Return the smoothing kernel, a NamedTuple of `sph.kernels`."""
+        return registry.model("sph.kernels", self.kernel)
+
+    def eos_model(self):
+        """Return the equation of state, a NamedTuple of `sph.eos`."""
+        return registry.model("sph.eos", self.eos or {"name": "ideal_gas", "gamma": self.gamma})
+
+    def given(self, **attributes: bool) -> list[str]:
+        """Return the first key of each part that is given and has these class attributes."""
+        return [
+            kind.keys[0].name
+            for kind in self.kinds[1:]
+            if kind.keys
+            and getattr(self, kind.keys[0].name) is not None
+            and all(getattr(kind, name) == value for name, value in attributes.items())
+        ]
+
+    def shown(self, key: str) -> str:
+        """Return the value of a key as TOML."""
+        return value_text(getattr(self, key))
+
+
+@functools.cache
+def table(formulation: str) -> type[Physics]:
+    """Return the class of [physics] for that formulation: its keys and those of its parts."""
+    kinds = (registry.part_class(FORMULATIONS, formulation), *parts.classes(formulation))
+    fields = {key.name: _field(key) for kind in kinds for key in kind.keys}
+    found = create_model("Physics", __base__=Physics, __doc__=Physics.__doc__, **fields)
+    found.kinds = kinds
+    return found
+
+
+def chosen(raw: dict[str, Any]) -> type[Physics]:
+    """Return the class of [physics] for a table as given; that of the default if it is wrong."""
+    name = raw.get("formulation", DEFAULT)
+    known = registry.names(FORMULATIONS, folders=True)
+    return table(name if name in known else DEFAULT)
+
+
+def _field(key: Key) -> tuple[Any, Any]:
+    """Return type and pydantic field of a part's key."""
+    found = None
+    if key.kind is not None:
+        found = plain(key.kind, key.above, key.at_least, key.at_most)
+    if key.models:
+        choice = (
+            labelled_table(key.models, key.label, key.default_model, key.label_help)
+            if key.default_model
+            else Annotated[Any, ModelChoice(key.models)]
+        )
+        found = choice if found is None else found | choice
+    if key.default is None:
+        found = found | None
+    return found, Field(
+        key.default,
+        description=key.help,
+        examples=[key.example] if key.example is not None else None,
+        json_schema_extra={"restart": key.restart},
+    )

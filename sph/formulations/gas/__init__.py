@@ -1,0 +1,231 @@
+"""Grad-h SPH of a gas: density from neighbours, pair forces, artificial viscosity."""
+
+from typing import Literal, NamedTuple
+
+import numpy as np
+
+from sph import faults, kernels, registry
+from sph.eos import is_ideal
+from sph.formulations import Formulation
+from sph.formulations.gas.density import density
+from sph.formulations.gas.rates import rates
+from sph.formulations.gas.smoothing import Converged, FixedPasses
+from sph.formulations.gas.weighting import ByMass, ByNumber
+from sph.integrators.leapfrog import POSITIVE
+from sph.part import Evolved, Key, Pass
+from sph.state import COMMON, Field
+
+SCHEMES = "sph.formulations.gas.schemes"
+
+# Relative tolerance of a converged support radius; round-off of the density sum is about 1e-14.
+TOLERANCE = 1e-10
+
+FIELDS = (*COMMON, Field("omega"))
+
+
+class Models(NamedTuple):
+    """The models in the formulas. Their types, not their values, determine the compiled code."""
+
+    scheme: tuple
+    kernel: tuple
+    smoothing: tuple
+    weighting: tuple
+    eos: tuple
+    viscosity: tuple
+    exchange: tuple | None
+    balsara: tuple | None
+    support_ratio: float  # H/h of the kernel
+    eta: float
+    max_support: float  # upper limit of H, for particles without a root below; inf: none
+
+
+class Gas(Formulation):
+    """Density, smoothing lengths, thermodynamics and rates."""
+
+    keys = (
+        Key(
+            "scheme",
+            "pair force: how a pair of neighbours accelerate each other and exchange energy; "
+            "`sph list` describes each",
+            default="grad_h",
+            models=SCHEMES,
+        ),
+        Key(
+            "density",
+            'density estimate of a particle: "mass" sums m_j W over its neighbours; "number" sums '
+            "W and multiplies by its own mass, which is better for unequal masses and identical "
+            "for equal ones",
+            kind=Literal["mass", "number"],
+            default="mass",
+        ),
+        Key(
+            "density_passes",
+            "iterations of density and smoothing length in each step, which depend on each other: "
+            'a number, or "converged" to iterate until they no longer change',
+            kind=int | Literal["converged"],
+            default=2,
+            at_least=1,
+            at_most=100,  # more converge no further, and a step would never end
+        ),
+    )
+    evolved = (Evolved("internal_energy", "energy_rate", "predicted_energy", POSITIVE),)
+
+    def __init__(self, scene):
+        physics = scene.physics
+        terms = {role: model for part in scene.parts for role, model in part.terms.items()}
+        needs = {name for part in scene.parts for name in part.needs}
+        self.scheme = registry.model(SCHEMES, physics.scheme)
+        self.dimension = scene.dimension
+        self.density_passes = physics.density_passes
+        self.density = physics.density
+        self.exchanges = terms.get("exchange") is not None
+        self.evolves_alpha = not terms["viscosity"].finds_shocks
+        self.bounds_acceleration = (
+            physics.density == "number"
+        )  # the signal speed does not contain unequal masses
+        sums = self.scheme.sums_pressure
+        self.fields = (*FIELDS, Field("pressure_term", stored=False))
+        if sums or self.exchanges:
+            self.fields += (Field("pressure", stored=sums, remade=True),)
+        if sums:
+            self.fields += (Field("energy_shift", stored=False),)
+        self.fields += tuple(
+            Field(name, stored=False) for name in ("div_v", "curl_v") if name in needs
+        )
+        self.starting_models = self._models(scene, terms, Converged(TOLERANCE))
+        self.models = self.starting_models
+        if physics.density_passes != "converged":
+            self.models = self._models(scene, terms, FixedPasses(physics.density_passes, TOLERANCE))
+        self.eos = self.models.eos
+        self.passes = self._passes(scene)
+
+    @classmethod
+    def of(cls, scene):
+        return cls(scene)
+
+    @classmethod
+    def issues(cls, physics, problem):
+        scheme = registry.model(SCHEMES, physics.scheme)
+        if scheme.sums_pressure and not is_ideal(physics.eos_model()):
+            return [("scheme", f"expected an ideal gas, not {physics.shown('eos')}")]
+        return []
+
+    def _models(self, scene, terms, smoothing) -> Models:
+        physics = scene.physics
+        kernel = physics.kernel_model()
+        return Models(
+            scheme=self.scheme,
+            kernel=kernel,
+            smoothing=smoothing,
+            weighting=ByNumber() if physics.density == "number" else ByMass(),
+            eos=scene.eos,
+            viscosity=terms["viscosity"],
+            exchange=terms.get("exchange"),
+            balsara=terms["balsara"],
+            support_ratio=kernels.support_ratio(kernel, scene.dimension),
+            eta=float(physics.eta),
+            max_support=scene.max_support,
+        )
+
+    def _passes(self, scene) -> tuple[Pass, ...]:
+        """Return the two passes, with the fields that this scene has."""
+        declared = {field.name for part in (self, *scene.parts) for field in part.fields}
+
+        def of(*names):
+            return tuple(name for name in names if name in declared)
+
+        rated = "predicted_alpha" in declared
+        return (
+            Pass(
+                "density",
+                "density",
+                self._density,
+                of("position", "predicted_velocity", "mass", "predicted_energy", "support",
+                   "predicted_alpha"),
+                of("support_before", "support", "density", "omega", "pressure", "energy_shift",
+                   "div_v", "curl_v", "pressure_term", "sound_speed", "balsara",
+                   *["alpha_rate"] * rated),
+                widens=True,
+            ),
+            Pass(
+                "rates",
+                "rates",
+                self._rates,
+                of("position", "predicted_velocity", "mass", "predicted_energy", "support",
+                   "density", "pressure_term", "sound_speed", "balsara", "pressure",
+                   "energy_shift", "exchange_share",
+                   "predicted_alpha" if rated else "alpha"),
+                ("acceleration", "energy_rate", "signal_speed"),
+            ),
+        )  # fmt: skip
+
+    def _density(self, sweep) -> None:
+        """Do steps 2-4 and 6: density, support, Omega, div v, curl v, and what follows."""
+        s = sweep.state
+        sweep.run(
+            density, sweep.models, s.position, s.predicted_velocity, s.mass, s.predicted_energy,
+            s.support, s.get("predicted_alpha"), s.support_before, s.density, s.omega,
+            s.get("pressure"), s.get("energy_shift"), s.get("div_v"), s.get("curl_v"),
+            s.pressure_term, s.sound_speed, s.get("balsara"), s.get("alpha_rate"), sweep.wanted,
+        )  # fmt: skip
+        if not sweep.wanted.max() > 0.0:  # otherwise the pass is repeated from the old supports
+            s.support, s.support_before = s.support_before, s.support
+
+    def _rates(self, sweep) -> None:
+        """Do step 5: acceleration, du/dt, and the signal speed of each particle."""
+        s = sweep.state
+        alpha = s.get("predicted_alpha")
+        sweep.run(
+            rates, sweep.models, s.position, s.predicted_velocity, s.mass, s.predicted_energy,
+            s.support, s.density, s.pressure_term, s.sound_speed,
+            s.get("alpha") if alpha is None else alpha, s.get("balsara"), s.get("pressure"),
+            s.get("energy_shift"), s.predicted_energy if self.exchanges else None,
+            s.get("exchange_share"), s.acceleration, s.energy_rate, s.signal_speed,
+        )  # fmt: skip
+
+    @property
+    def label(self):
+        return self.scheme.name
+
+    def remake(self, state, missing):
+        if "pressure" in missing and self.scheme.sums_pressure:
+            state.pressure[:] = self.eos.pressure(state.density, state.internal_energy)
+
+    def pressure(self, state):
+        if self.scheme.sums_pressure:
+            return state.pressure
+        return self.eos.pressure(state.density, state.internal_energy)
+
+    def described(self):
+        kernel = self.models.kernel
+        flattened = ", gradient flattened" if kernel.flattened else ""
+        inside = [
+            f"scheme {self.scheme.name}, kernel {kernel.name}{flattened}",
+            f"density by {self.density}",
+            f"equation of state {self.eos.name}",
+            "supports converged to 1e-10"
+            if self.density_passes == "converged"
+            else f"{self.density_passes} density pass(es)",
+        ]
+        sums = "sum of the pressure"
+        if self.scheme.sums_pressure:
+            return [*inside, sums], []
+        return inside, [(sums, f"{self.scheme.name} takes it from density")]
+
+    def check(self, simulation):
+        """Raise NumericalError if the sound speed of a particle is not real, under tension."""
+        if self.eos.lowest_energy is None:
+            return
+        p = simulation.particles
+        above = p.internal_energy - self.eos.lowest_energy(p.density)
+        if not (above <= 0.0).any():
+            return
+        i = int(np.nanargmin(above))
+        raise faults.fault(
+            simulation,
+            f"particle {p.id[i]} is under more tension than its equation of state allows: "
+            f"density {p.density[i]:.6g}, internal energy {p.internal_energy[i]:.6g}",
+            "a weaker rarefaction, more particles, or a boundary other than open, at which the "
+            "density sum lacks neighbours",
+            int(p.id[i]),
+        )

@@ -1,0 +1,76 @@
+"""External gravitational fields, one file each: a NamedTuple with
+
+    acceleration(position)    (D, N) at positions (D, N)
+    potential(position)       (N,) per unit mass, zero at infinity or where the file says
+    misfit(boundaries)        why the field cannot be used with these boundaries (one per axis) and
+                              what to try, or None
+
+The first two are called from Python once per step; the last when a configuration is read.
+Reflecting walls suit every field, since no particle jumps in its potential.
+"""
+
+from sph import registry
+from sph.model import Model
+from sph.part import Key, Part, Pass
+
+FOLDER = "sph.parts.external"
+
+
+class Field(Model):
+    """Defaults of an external field."""
+
+    softening = 0.0  # a length; 0 for fields without softening
+
+    def misfit(self, boundaries):
+        return None
+
+
+class External(Part):
+    """An external field, its potential energy, and the limit of |a| on the time step."""
+
+    title = "external field"
+    keys = (
+        Key(
+            "external",
+            "external gravitational field, with G = 1; none if not given",
+            models=FOLDER,
+            example={"name": "point_mass", "mass": 1.0},
+            restart="refused",
+        ),
+    )
+    balances_pressure = True
+    columns = ("potential_energy",)
+    keeps_momentum = False
+    bounds_acceleration = True
+
+    def __init__(self, field):
+        self.field = field
+        self.passes = (
+            Pass("additions", "rates", self._add, ("position", "acceleration"), ("acceleration",)),
+        )
+
+    @classmethod
+    def of(cls, scene):
+        field = registry.model(FOLDER, scene.physics.external)
+        return None if field is None else cls(field)
+
+    @classmethod
+    def issues(cls, physics, problem):
+        field = registry.model(FOLDER, physics.external)
+        misfit = None if field is None else field.misfit(problem.boundaries)
+        return [("external", misfit)] if misfit else []
+
+    def _add(self, sweep) -> None:
+        state = sweep.state
+        state.acceleration += self.field.acceleration(state.position)
+
+    def energies(self, state):
+        return {"potential_energy": self.field.potential(state.position)}
+
+    def remedies(self, trouble, held_by):
+        softening = f"a {'larger ' * (self.field.softening > 0.0)}softening of physics.external"
+        if trouble == "endless energy":
+            return [f"{softening}, or no particle at the position of its mass"]
+        if trouble == "drift" or (trouble == "short steps" and held_by == "acceleration"):
+            return [softening]
+        return []

@@ -1,0 +1,1 @@
+"""Viscosity switches, one file each: alpha of a particle rises in shocks and decays afterwards."""

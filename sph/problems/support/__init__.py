@@ -1,0 +1,1 @@
+"""What several problems share: placement of particles, waves from the ends, and figures."""

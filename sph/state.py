@@ -1,0 +1,163 @@
+"""The state: named arrays with one entry per particle, each declared once by the part that owns it.
+
+The declaration determines signs at mirrors, reordering, checkpoints, public names and units.
+"""
+
+from collections.abc import Iterable, Mapping
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+
+class Public(NamedTuple):
+    """A field in the public part of a checkpoint: name, exponents of its unit, description."""
+
+    name: str
+    length: int
+    mass: int
+    time: int
+    scale_factor: int  # cosmological, for programs that ask
+    description: str
+
+
+class Field(NamedTuple):
+    """The declaration of an array.
+
+    rank: 0 for a scalar (N,), 1 for a vector (D, N), 2 for a tensor (D, D, N). A reflecting wall
+    changes the sign of a vector's component, and of a tensor's mixed components.
+    """
+
+    name: str
+    rank: int = 0
+    stored: bool = True  # in checkpoints; else a work array
+    remade: bool = False  # a restart can compute it, so it may be missing in a checkpoint
+    above: float | None = None  # bounds of a physical value
+    at_least: float | None = None
+    integer: bool = False
+    public: Public | None = None
+
+    def shape(self, dimension: int, number: int) -> tuple[int, ...]:
+        return (dimension,) * self.rank + (number,)
+
+
+# What every formulation has.
+COMMON = (
+    Field(
+        "id",
+        integer=True,
+        public=Public("ParticleIDs", 0, 0, 0, 0, "Identification number, from 1"),
+    ),
+    Field("mass", above=0.0, public=Public("Masses", 0, 1, 0, 0, "Mass")),
+    Field(
+        "position",
+        rank=1,
+        public=Public(
+            "Coordinates", 1, 0, 0, 1, "Position from the corner of the box; add Header/Origin"
+        ),
+    ),
+    Field("velocity", rank=1, public=Public("Velocities", 1, 0, -1, 0, "Velocity")),
+    Field(
+        "internal_energy",
+        at_least=0.0,
+        public=Public("InternalEnergies", 2, 0, -2, -2, "Internal energy per unit mass"),
+    ),
+    Field(
+        "support",
+        above=0.0,
+        public=Public(
+            "SmoothingLengths", 1, 0, 0, 1, "Smoothing length h; the kernel ends at H = (H/h) h"
+        ),
+    ),
+    Field(
+        "density",
+        above=0.0,
+        public=Public("Densities", -3, 1, 0, -3, "Density, per D-dimensional volume"),
+    ),
+    Field("acceleration", rank=1),
+    Field("energy_rate"),
+    Field("predicted_velocity", rank=1, stored=False),  # at the full step (eqs 4 and 5)
+    Field("predicted_energy", stored=False),
+    Field("support_before", stored=False),  # H of the step before
+    Field("sound_speed", stored=False),
+    Field("signal_speed", stored=False),  # the largest of the particle's pairs (eq 32)
+)
+
+
+class State:
+    """N particles in D dimensions: one attribute per field, float64 except IDs, in code units.
+
+    The memory order is that of the neighbour blocks and changes when these are rebuilt. `id` (from
+    1) identifies a particle during the whole run.
+    """
+
+    def __init__(self, fields: Iterable[Field], arrays: Mapping[str, np.ndarray]):
+        """Create a state with the `fields` that are in `arrays`, in the order of declaration."""
+        self.fields = tuple(field for field in fields if field.name in arrays)
+        for field in self.fields:
+            setattr(self, field.name, arrays[field.name])
+
+    if TYPE_CHECKING:  # the fields, which parts declare
+
+        def __getattr__(self, name: str) -> np.ndarray: ...
+
+    @classmethod
+    def at_start(
+        cls, fields: Iterable[Field], position, velocity, mass, internal_energy
+    ) -> "State":
+        """Return particles with IDs 1 … N in the given order; all other fields are zero."""
+        dimension, n = position.shape
+        given = {
+            "position": position, "velocity": velocity, "mass": mass,
+            "internal_energy": internal_energy,
+        }  # fmt: skip
+        arrays = {"id": np.arange(1, n + 1, dtype=np.int64)}
+        for field in fields:
+            if field.name in given:
+                arrays[field.name] = np.array(given[field.name], dtype=np.float64, order="C")
+            elif not field.integer:
+                arrays[field.name] = np.zeros(field.shape(dimension, n))
+        return cls(fields, arrays)
+
+    @property
+    def number(self) -> int:
+        """N."""
+        return self.mass.size
+
+    @property
+    def dimension(self) -> int:
+        """D."""
+        return self.position.shape[0]
+
+    def get(self, name: str) -> np.ndarray | None:
+        """Return the array of that name, or None if no part of the scene declares it."""
+        return self.__dict__.get(name)
+
+    def declare(self, fields: Iterable[Field]) -> list[str]:
+        """Keep exactly these fields; add missing ones as zeros and return their names."""
+        fields, known = tuple(fields), {field.name for field in self.fields}
+        for name in known - {field.name for field in fields}:
+            delattr(self, name)
+        new = [field for field in fields if field.name not in known]
+        for field in new:
+            setattr(self, field.name, np.zeros(field.shape(self.dimension, self.number)))
+        self.fields = fields
+        return [field.name for field in new]
+
+    def arrays(self) -> dict[str, np.ndarray]:
+        """Return the arrays that a checkpoint stores, by name."""
+        return {field.name: getattr(self, field.name) for field in self.fields if field.stored}
+
+    def subset(self, indices: np.ndarray) -> "State":
+        """Return a copy of the stored fields for the particles `indices`, in that order."""
+        arrays = self.arrays().items()
+        chosen = {name: np.ascontiguousarray(array[..., indices]) for name, array in arrays}
+        return State(self.fields, chosen)
+
+    def by_id(self) -> "State":
+        """Return a copy in order of ID, to compare runs or to plot."""
+        return self.subset(np.argsort(self.id, kind="stable"))
+
+    def reorder(self, order: np.ndarray, names: Iterable[str]) -> None:
+        """Reorder the arrays `names` in memory by `order`, (N,) indices."""
+        for name in names:
+            setattr(self, name, getattr(self, name).take(order, axis=-1))

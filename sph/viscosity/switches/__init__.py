@@ -1,1 +1,0 @@
-"""Switches: how each particle's viscosity coefficient rises in shocks and decays. One file each."""

@@ -1,0 +1,131 @@
+"""Documents name only what exists: links, files, commands with their options, and keys.
+
+The examples of CONTRIBUTING.md are executed.
+"""
+
+import inspect
+import re
+import shlex
+from pathlib import Path
+
+import pytest
+
+from sph import registry
+from sph.cli import main
+from sph.config.sections import SECTIONS
+
+ROOT = Path(__file__).parents[2]
+DOCUMENTS = [
+    ROOT / "README.md",
+    ROOT / "CONTRIBUTING.md",
+    *sorted((ROOT / "docs").glob("*.md")),
+    ROOT / "docs" / "studies" / "README.md",
+]
+every_document = pytest.mark.parametrize(
+    "document", DOCUMENTS, ids=lambda path: str(path.relative_to(ROOT))
+)
+EXAMPLES = re.findall(
+    r"Create `(sph/[\w/]+)/(\w+)\.py`:\n\n```python\n(.*?)```",
+    (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8"),
+    re.DOTALL,
+)
+CREATED = {f"{folder}/{name}.py" for folder, name, _ in EXAMPLES} | {"configs/shear_wave.toml"}
+
+
+def text_of(document: Path) -> str:
+    return document.read_text(encoding="utf-8")
+
+
+def anchors(document: Path) -> set[str]:
+    """The anchors that GitHub makes of the headings."""
+    headings = re.findall(r"^#+ (.+)$", text_of(document), re.MULTILINE)
+    shown = (re.sub(r"\[(.*?)\]\(.*?\)", r"\1", one).lower() for one in headings)
+    return {re.sub(r"[^\w\- ]", "", one).replace(" ", "-") for one in shown}
+
+
+@every_document
+def test_relative_links_lead_to_files_and_headings(document):
+    wrong = []
+    for link in re.findall(r"\]\(([^)\s]+)\)", text_of(document)):
+        if re.match(r"[a-z]+:", link):
+            continue
+        path, _, anchor = link.partition("#")
+        target = document.parent / path if path else document
+        if not target.exists() or (anchor and anchor not in anchors(target)):
+            wrong.append(link)
+    assert not wrong
+
+
+@every_document
+def test_named_files_exist(document):
+    named = re.findall(
+        r"(?<![\w/.~-])((?:sph|tests|scripts|configs|docs)/[\w./-]*\w)", text_of(document)
+    )
+    placeholders = {name for name in named if "NAME" in name}
+    assert not {name for name in named if not (ROOT / name).exists()} - CREATED - placeholders
+
+
+def models(package: str) -> list[type]:
+    """The class of each file of a package that is found by its folder."""
+    if package == "sph.problems":
+        return [registry.load(package, name).Problem for name in registry.names(package)]
+    return [registry.model_class(package, name) for name in registry.names(package)]
+
+
+def keys() -> dict[str, set[str]]:
+    """The keys of each table, those of all problems together; figures of the summary may be of
+    `report`, too.
+    """
+    found = {name: set(table.model_fields) for name, table in SECTIONS.items() if name != "report"}
+    found["problem"] = {key for problem in models("sph.problems") for key in problem.model_fields}
+    return found
+
+
+@every_document
+def test_named_keys_exist(document):
+    tables = keys()
+    text = re.sub(r"https?://\S+", "", text_of(document))
+    named = re.findall(rf"(?<![\w/.-])({'|'.join(tables)})\.([A-Za-z]\w*)(?![\w(])", text)
+    assert not {f"{table}.{key}" for table, key in named if key not in tables[table] | {"py"}}
+
+
+@every_document
+def test_commands_have_their_options(document):
+    wrong = []
+    for line in re.findall(r"^ *(sph [a-z].*)$|`(sph [a-z].*?)`", text_of(document), re.MULTILINE):
+        words = shlex.split(" ".join(line), comments=True)
+        command = main.commands.get(words[1])
+        options = command and {name for one in command.params for name in one.opts} | {"--help"}
+        given = {word for word in words[2:] if re.match(r"-\w|--\w", word)}
+        if command is None or not given <= options:
+            wrong.append(" ".join(words))
+    assert not wrong
+
+
+def test_readme_lists_every_configuration():
+    section = text_of(ROOT / "README.md").split("\n## Problems\n")[1].split("\n## ")[0]
+    cells = re.findall(r"^\| (`.*?) \|", section, re.MULTILINE)
+    listed = [name for cell in cells for name in re.findall(r"`(\w+)`", cell)]
+    assert sorted(listed) == sorted(path.stem for path in (ROOT / "configs").glob("*.toml"))
+
+
+def test_contributing_has_an_example_for_each_folder():
+    assert {folder for folder, _, _ in EXAMPLES} == {
+        "sph/kernels", "sph/schemes", "sph/eos", "sph/viscosity/switches", "sph/problems",
+    }  # fmt: skip
+
+
+@pytest.mark.parametrize(("folder", "name", "code"), EXAMPLES, ids=[one[1] for one in EXAMPLES])
+def test_example_has_what_every_file_of_its_folder_has(folder, name, code):
+    defined = {"__name__": f"example_{name}"}
+    exec(compile(code, f"CONTRIBUTING.md, {name}.py", "exec"), defined)
+    (example,) = (
+        kind
+        for kind in defined.values()
+        if isinstance(kind, type) and kind.__module__ == defined["__name__"]
+    )
+    siblings = [vars(kind) for kind in models(folder.replace("/", "."))]
+    common = set.intersection(*(set(one) for one in siblings))
+    methods = {one for one in common if inspect.isfunction(siblings[0][one]) and one[0] != "_"}
+    assert methods
+    assert methods <= set(vars(example))
