@@ -47,7 +47,7 @@ for name in registry.names("sph.problems"):
     before = set(sys.modules)
 
 import numpy as np
-from sph import lattice
+from sph.problems.support import lattice
 lattice.fill(np.array([[0.0, 1.0]]), 10, "cubic")
 found["a lattice that is no glass"] = imported("scipy.spatial")
 
