@@ -74,7 +74,7 @@ def test_figures_of_a_newer_version_are_kept():
         ("errors.fields.density.L2", ..., "errors.fields.density.L2 is missing"),
     ],
 )
-def test_what_is_wrong_is_named(tmp_path, name, value, words):
+def test_summary_invalid_entry_is_named(tmp_path, name, value, words):
     run = RunDirectory(tmp_path)
     run.summary.write_text(changed(name, value))
     if words is None:
@@ -96,7 +96,7 @@ def test_figures_are_named_as_problems_name_them():
     assert figure(unjudged, "peak") is None
 
 
-def test_a_figure_is_looked_up_by_its_tables():
+def test_figure_is_found_by_its_tables():
     summary = of_json(json.dumps(WRITTEN))
     assert lookup(summary, "cost.session.steps") == 3
     assert lookup(summary, "steps") == 3
