@@ -44,7 +44,7 @@ def anchors(document: Path) -> set[str]:
 
 
 @every_document
-def test_relative_links_lead_to_files_and_headings(document):
+def test_relative_link_targets_exist(document):
     wrong = []
     for link in re.findall(r"\]\(([^)\s]+)\)", text_of(document)):
         if re.match(r"[a-z]+:", link):
@@ -90,7 +90,7 @@ def test_named_keys_exist(document):
 
 
 @every_document
-def test_commands_have_their_options(document):
+def test_options_of_commands_exist(document):
     wrong = []
     for line in re.findall(r"^ *(sph [a-z].*)$|`(sph [a-z].*?)`", text_of(document), re.MULTILINE):
         words = shlex.split(" ".join(line), comments=True)
@@ -109,14 +109,14 @@ def test_readme_lists_every_configuration():
     assert sorted(listed) == sorted(path.stem for path in (ROOT / "configs").glob("*.toml"))
 
 
-def test_contributing_has_an_example_for_each_folder():
+def test_contributing_has_example_for_each_folder():
     assert {folder for folder, _, _ in EXAMPLES} == {
         "sph/kernels", "sph/schemes", "sph/eos", "sph/viscosity/switches", "sph/problems",
     }  # fmt: skip
 
 
 @pytest.mark.parametrize(("folder", "name", "code"), EXAMPLES, ids=[one[1] for one in EXAMPLES])
-def test_example_has_what_every_file_of_its_folder_has(folder, name, code):
+def test_example_defines_names_common_to_its_folder(folder, name, code):
     defined = {"__name__": f"example_{name}"}
     exec(compile(code, f"CONTRIBUTING.md, {name}.py", "exec"), defined)
     (example,) = (
