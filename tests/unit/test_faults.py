@@ -47,11 +47,9 @@ def test_fault_message_has_time_cause_and_suggestion(messages):
 class Strict(Part):
     """A part that bounds the step of each particle, and says no more about that."""
 
-    name = "strict"
-
 
 def test_step_limit_text_names_particle_and_criterion(messages):
-    criteria = [*sorted(faults.SETS), "viscosity", "conductivity", "strict"]
+    criteria = [*sorted(faults.SETS), "viscosity", "conductivity", Strict.name]
     text = '[problem]\nname = "uniform"\n[physics]\nconductivity = "approach"\n'
     parts = (*Scene(configuration.from_text(text)).all_parts, Strict())
     assert set(criteria) - set(faults.SETS) < {part.name for part in parts}

@@ -178,8 +178,6 @@ def test_gas_at_rest_without_pressure_takes_one_step():
 class Strict(Part):
     """Bounds the step of each particle by itself."""
 
-    name = "strict"
-
     def __init__(self, *times):
         self.times = np.array(times)
 
@@ -191,8 +189,8 @@ def test_step_limited_by_part():
     others = (Part(), Strict(0.3, 0.4))
     assert limit_of(ALL, particles(), parts=others) == (0.1, 8, "signal_speed")
     # not times the Courant number; of two alike the lower ID
-    assert limit_of(ALL, particles(), parts=(*others, Strict(0.09, 0.02))) == (0.02, 5, "strict")
-    assert limit_of(ALL, particles(), parts=(Strict(0.02, 0.02),)) == (0.02, 5, "strict")
+    assert limit_of(ALL, particles(), parts=(*others, Strict(0.09, 0.02))) == (0.02, 5, Strict.name)
+    assert limit_of(ALL, particles(), parts=(Strict(0.02, 0.02),)) == (0.02, 5, Strict.name)
     # of a part's bound as of every other, what supports and growth allow is less
     past = Past(dt=1e-3, limit=1e-3)
     assert limit_of(ALL, particles(), past, (Strict(0.02, 0.02),)).criterion == "growth"
