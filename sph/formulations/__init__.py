@@ -3,6 +3,8 @@
 The `__init__.py` of a folder defines one subclass of `Formulation`.
 """
 
+from typing import Any
+
 import numpy as np
 
 from sph.part import Part
@@ -16,9 +18,8 @@ class Formulation(Part):
     """The part with the basic equations (`physics.formulation`), of which a scene has one."""
 
     fields = COMMON
-    # The models of the passes, and those of the first passes, which have no initial guess.
-    models: tuple
-    starting_models: tuple
+    # What the passes take; `kernel`, `eos`, `support_ratio` (H/h) and `eta` are among them.
+    models: Any
 
     @property
     def label(self) -> str:

@@ -5,7 +5,7 @@ branch-free loops over it for every particle of the block, so its results do not
 number of threads. Arguments that are None leave their part out of the compiled code.
 """
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -32,14 +32,15 @@ class Sweep:
     run again for it.
     """
 
-    def __init__(self, state: State, team: Team, blocks: int):
+    def __init__(self, state: State, team: Team, blocks: int, models: Any):
         self.state = state
         self.team = team
         self.dim = (0,) * state.dimension
         self.wanted = np.empty(blocks)
-        self.models = None  # of the formulation; different in the first passes
+        self.models = models  # of the formulation
         self.neighbours: Neighbours | None = None
         self.dt = 0.0  # of the present step
+        self.is_start = False  # before the first step, where supports are guesses
 
     def run(self, function, models, *arguments) -> None:
         """Call function(first, last, dim, models, neighbours, *arguments) over ranges of blocks."""

@@ -264,8 +264,8 @@ def run_engine(case, gas, skin, threads):
     for name in ("alpha", "predicted_alpha"):
         if state.get(name) is not None:
             state.get(name)[:] = gas.alpha
-    sweep = passes.Sweep(state, team, ordering.number_of_blocks(count))
-    sweep.models = scene.formulation.models._replace(smoothing=case.smoothing)
+    models = scene.formulation.models._replace(smoothing=case.smoothing)
+    sweep = passes.Sweep(state, team, ordering.number_of_blocks(count), models)
     sweep.dt = STEP
     sweep.wanted.fill(np.nan)
     density, *others = scene.passes
