@@ -58,7 +58,9 @@ class Simulation:
             field for field in scene.fields if field.rank and field.name in self._carried
             and field.name != "position"
         ]  # fmt: skip
-        self._sweep = passes.Sweep(particles, self.team, number_of_blocks(particles.number))
+        self._sweep = passes.Sweep(
+            particles, self.team, number_of_blocks(particles.number), scene.formulation.models
+        )
 
     @classmethod
     def start(cls, scene: Scene, threads: int, clock: Clock) -> "Simulation":
@@ -82,13 +84,13 @@ class Simulation:
         resolution.check_extent(self)
         leapfrog.keep(self.particles, self.evolved)
         self._build_lists(dt=0.0, guess=True)
-        self._sweep.models = self.scene.formulation.starting_models
+        self._sweep.is_start = True
         for one in self.scene.passes:
             if one.at_start:
                 self._make(one)
             if one.widens:
                 resolution.check(self)
-        self._sweep.models = self.scene.formulation.models
+        self._sweep.is_start = False
         self._measure(past=None)
 
     @classmethod
@@ -105,7 +107,6 @@ class Simulation:
         self.limit = step_size.StepLimit(next_step, 0, "checkpoint")
         with clock.phase("lists"):
             self.search.build(origin, particles.id)
-        self._sweep.models = scene.formulation.models
         self.totals = totals.of(particles, scene.all_parts, scene.keeps_momentum)
         anew = totals.Budget(0.0, 0.0, totals.Baseline.at(self.totals, 0.0))
         self.go_on_from(anew if budget is None else budget)

@@ -3,6 +3,8 @@
 The `__init__.py` of a folder defines one subclass of `Formulation`.
 """
 
+from typing import Any
+
 import numpy as np
 
 from sph.part import Part
@@ -16,10 +18,8 @@ class Formulation(Part):
     """The part with the basic equations. A scene has exactly one (`physics.formulation`)."""
 
     fields = COMMON
-    # The models of the passes, and the models of a run's first passes, which start from rough
-    # guesses of the support radii.
-    models: tuple
-    starting_models: tuple
+    # The models that passes use, among them `kernel`, `eos`, `support_ratio` (H/h) and `eta`.
+    models: Any
 
     @property
     def label(self) -> str:

@@ -7,7 +7,7 @@ so results do not depend on the number of threads. An argument that is None remo
 uses the argument from the compiled pass.
 """
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -34,14 +34,15 @@ class Sweep:
     multiple of list_support that the lists must reach before the pass is repeated for the block.
     """
 
-    def __init__(self, state: State, team: Team, blocks: int):
+    def __init__(self, state: State, team: Team, blocks: int, models: Any):
         self.state = state
         self.team = team
         self.dim = (0,) * state.dimension
         self.wanted = np.empty(blocks)
-        self.models = None  # those of the formulation; the first passes of a run use others
+        self.models = models  # those of the formulation
         self.neighbours: Neighbours | None = None
         self.dt = 0.0  # of the present step
+        self.is_start = False  # before the first step, where supports are guesses
 
     def run(self, function, models, *arguments) -> None:
         """Call function(first, last, dim, models, neighbours, *arguments) over ranges of blocks."""

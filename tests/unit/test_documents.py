@@ -48,7 +48,7 @@ def anchors(document: Path) -> set[str]:
 
 
 @every_document
-def test_relative_links_lead_to_files_and_headings(document):
+def test_relative_link_targets_exist(document):
     wrong = []
     for link in re.findall(r"\]\(([^)\s]+)\)", text_of(document)):
         if re.match(r"[a-z]+:", link):
@@ -94,7 +94,7 @@ def test_named_keys_exist(document):
 
 
 @every_document
-def test_commands_have_their_options(document):
+def test_options_of_commands_exist(document):
     wrong = []
     for line in re.findall(r"^ *(sph [a-z].*)$|`(sph [a-z].*?)`", text_of(document), re.MULTILINE):
         words = shlex.split(" ".join(line), comments=True)
@@ -127,7 +127,7 @@ def test_help_offers_a_table_of_parameters_only_where_a_model_has_some():
     assert not ModelChoice("sph.formulations.gas.schemes").describe().endswith(offered)
 
 
-def test_contributing_has_an_example_for_each_folder():
+def test_contributing_has_example_for_each_folder():
     assert {folder for folder, _, _ in EXAMPLES} == {
         "sph/kernels", "sph/formulations/gas/schemes", "sph/eos", "sph/parts/viscosity/switches",
         "sph/problems",
@@ -135,7 +135,7 @@ def test_contributing_has_an_example_for_each_folder():
 
 
 @pytest.mark.parametrize(("folder", "name", "code"), EXAMPLES, ids=[one[1] for one in EXAMPLES])
-def test_example_has_what_every_file_of_its_folder_has(folder, name, code):
+def test_example_defines_names_common_to_its_folder(folder, name, code):
     defined = {"__name__": f"example_{name}"}
     exec(compile(code, f"CONTRIBUTING.md, {name}.py", "exec"), defined)
     (example,) = (

@@ -161,8 +161,10 @@ class Gas(Formulation):
     def _density(self, sweep) -> None:
         """Do steps 2-4 and 6: density, support, Omega, div v, curl v, EOS and rate of alpha."""
         s = sweep.state
+        # guesses converge first; only this pass, so that no other is compiled for it
+        models = self.starting_models if sweep.is_start else sweep.models
         sweep.run(
-            density, sweep.models, s.position, s.predicted_velocity, s.mass, s.predicted_energy,
+            density, models, s.position, s.predicted_velocity, s.mass, s.predicted_energy,
             s.support, s.get("predicted_alpha"), s.support_before, s.density, s.omega,
             s.get("pressure"), s.get("energy_shift"), s.get("div_v"), s.get("curl_v"),
             s.pressure_term, s.sound_speed, s.get("balsara"), s.get("alpha_rate"), sweep.wanted,
