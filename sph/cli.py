@@ -1,4 +1,4 @@
-"""The command `sph` and its subcommands on single runs; `cli_studies` holds those on many runs."""
+"""The command `sph` and its subcommands on single runs; for many runs see `cli_studies`."""
 
 import signal
 import sys

@@ -1,4 +1,4 @@
-"""The watchdog: checks after each step that the state of a simulation is finite and physical.
+"""The watchdog: checks after each step that the state is finite and physical.
 
 Most checks use sums that the history needs anyway. Individual particles are examined only after a
 check has failed, in open domains, and for gas that can be under tension.

@@ -1,4 +1,4 @@
-"""Types of keys whose value names a file in a package: a scheme, a kernel, an equation of state."""
+"""Types of keys whose value names a file in a package, such as a scheme or a kernel."""
 
 import functools
 import types

@@ -1,4 +1,4 @@
-"""The leapfrog: prediction and correction of all evolved fields, in place (eqs 1-6 and 29-31).
+"""The leapfrog: prediction and correction of all evolved fields (eqs 1-6 and 29-31).
 
 Internal energy and other positive quantities are kept positive. If a change c would take more than
 half of u, u + c is replaced by u/2 e^(1 + 2 c/u), which has the same value and slope at c = -u/2

@@ -1,4 +1,4 @@
-"""Checks that the files in a run directory belong to one run, so that no other run is replaced."""
+"""Checks that the files in a run directory belong to one run."""
 
 import itertools
 from pathlib import Path

@@ -161,7 +161,8 @@ class Gas(Formulation):
     def _density(self, sweep) -> None:
         """Do steps 2-4 and 6: density, support, Omega, div v, curl v, EOS and rate of alpha."""
         s = sweep.state
-        # guesses converge first; only this pass, so that no other is compiled for it
+        # Before the first step supports are guesses and must converge. Only this pass gets the
+        # models for that, so no other pass is compiled twice.
         models = self.starting_models if sweep.is_start else sweep.models
         sweep.run(
             density, models, s.position, s.predicted_velocity, s.mass, s.predicted_energy,
