@@ -215,7 +215,7 @@ def test_restart_on_other_software_notes_difference(done, tmp_path, monkeypatch)
 def test_more_threads_than_processors_is_noted(done, config, tmp_path, monkeypatch):
     monkeypatch.setattr(runner, "available_processors", lambda: 2)
     asked = ("-o", tmp_path / "run", "--set", "time.end=0.05", "--threads")
-    words = "run.threads = 3, but this process may use 2 processor(s)"
+    words = "run.threads = 3, but this process may use only 2 processor(s)"
     assert words not in sph_("run", config, *asked, 2).stderr
     result = sph_("run", config, "--force", *asked, 3)
     assert words in result.stderr
@@ -479,7 +479,7 @@ def test_stop_while_compiling_and_restart_equals_uninterrupted_run(config, tmp_p
     """Also compiled code is the same whether it was just compiled or comes from the cache."""
     cache = {"NUMBA_CACHE_DIR": str(tmp_path / "cache")}
     process = started(tmp_path, "run", config, "-o", "stopped", **cache)
-    read_until(process.stderr, "compiling the code of this scene")
+    read_until(process.stderr, "compiling the code")
     process.send_signal(signal.SIGTERM)
     code, _, err = finished(process)
     assert code == 75, err

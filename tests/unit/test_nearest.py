@@ -20,7 +20,8 @@ def found_by_pass(search, position, support, mass, density, threads=1):
     )
     ratio = np.full(support.size, np.nan)
     team = EagerTeam(threads)
-    team.run(nearest, search.lists.start.size, dim, lists, position, support, mass, density, ratio)
+    fields = (position, support, mass, density, ratio)
+    team.run(nearest, search.lists.start.size, dim, None, lists, *fields)
     team.close()
     return ratio
 

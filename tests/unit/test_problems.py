@@ -365,7 +365,7 @@ def test_explosion_report_without_particles_in_region_is_partial():
         ({"discontinuity": 0.5}, "expected x inside"),
         ({"error_range": [0.4, -0.4]}, "with lo < hi"),
         ({"error_range": [10.0, 11.0]}, "inside the domain"),
-        ({"lattice": "bcc"}, 'take "cubic"'),
+        ({"lattice": "bcc"}, 'expected "cubic"'),
         ({"n": 3, "right": {"density": 1e-3, "pressure": 1.0}}, "at least 1000"),
         ({"left": {"density": 0.0, "pressure": 1.0}}, "greater than 0"),
     ],
@@ -630,7 +630,7 @@ def test_uniform_lattice_without_noise_has_no_force(dimension, kind):
 def test_uniform_velocity_has_a_component_for_each_axis():
     with pytest.raises(ValidationError, match="expected 2 components"):
         Uniform(velocity=[1.0, 2.0, 3.0])
-    with pytest.raises(ValidationError, match='take "cubic" or "hexagonal"'):
+    with pytest.raises(ValidationError, match='expected "cubic" or "hexagonal"'):
         Uniform(lattice="bcc")
 
 

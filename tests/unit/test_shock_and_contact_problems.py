@@ -132,7 +132,7 @@ def test_noh_shock_radius_found_in_any_dimension(dimension):
         ({"domain": [-1.0, 2.0], "boundary": "open"}, "expected"),
         (BALL | {"domain": [[-1.0, 1.0], [-1.0, 1.0], [-2.0, 2.0]]}, "equal for all axes"),
         ({"boundary": "periodic"}, "'mirror' or 'open'"),
-        ({"lattice": "bcc"}, 'take "cubic"'),
+        ({"lattice": "bcc"}, 'expected "cubic"'),
     ],
 )
 def test_noh_invalid_keys_are_refused(keys, message):

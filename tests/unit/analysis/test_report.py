@@ -300,6 +300,12 @@ def test_compare_unknown_field_key_or_directory_is_refused(messages, study, tmp_
         (point / "summary.json").write_text(text)
         with messages.raised(FileError, "summary.json"):
             compared(study)
+    for name in ("config.toml", "summary.json"):
+        whole = (point / name).read_bytes()
+        (point / name).write_bytes(b"\xff")
+        with messages.raised(FileError, name):
+            compared(study)
+        (point / name).write_bytes(whole)
     (point / "config.toml").write_text("problem = 1\n")
     with messages.raised(FileError, "config.toml"):
         compared(study)
