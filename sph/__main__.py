@@ -1,4 +1,4 @@
-"""Entry point of `sph` and `python -m sph`: installs signal handlers before the slow imports."""
+"""Entry point of `sph` and `python -m sph`: signal handlers before the slow imports."""
 
 import sys
 from importlib.util import find_spec

@@ -1,4 +1,4 @@
-"""The command `sph` and its subcommands on single runs; `cli_studies` holds those on many runs."""
+"""The command `sph` and its subcommands on single runs; for many runs see `cli_studies`."""
 
 import signal
 import sys
@@ -158,8 +158,8 @@ def plot(sources, target):
 def new(problem, target):
     """Print a commented configuration for PROBLEM.
 
-    It gives the meaning, bounds and default of each key. `sph list` names the
-    problems.
+    The text gives the meaning, bounds and default of each key. `sph list` names
+    the problems.
     """
     from sph import config as configuration
 

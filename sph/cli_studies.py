@@ -63,9 +63,9 @@ def sweep(config, varies, overrides, directory, jobs, scheduler, slurm, is_sure)
 def report(sources, field, norm, cost, by, reference, directory):
     """Compare the error of several runs with their cost.
 
-    DIR is a run directory, or a directory that contains some, such as that of a
-    sweep. The report says which settings reach a given error fastest, and how
-    much slower the others are.
+    DIR is a run directory, or a directory that contains run directories, such as
+    the directory of a sweep. The report says which settings reach a given error
+    at the lowest cost, and how much more the other settings cost.
     """
     from sph.analysis import report as reports
 
@@ -89,9 +89,9 @@ def report(sources, field, norm, cost, by, reference, directory):
 def stress(only, directory, jobs):
     """Run difficult test cases and check their results.
 
-    Some settings are expected failures: they pass if the run stops with an
-    error. The same command, repeated, runs only what is missing. Exits with
-    code 3 if a case does not pass.
+    A case has several settings. Some settings are known not to work (expected
+    failures) and must fail in a stated way. The same command, repeated, runs
+    only what is missing. Exits with code 3 if a case does not pass.
     """
     from sph.stress import command, table
 

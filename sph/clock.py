@@ -1,15 +1,15 @@
-"""What a run costs, in time. What the words mean is defined in `sph.summary`."""
+"""Measurement of CPU and wall-clock time by phase. `sph.summary` defines the terms."""
 
 import time
 
 from numba.core import event
 
-# The phase in which Numba fills its tables, on first use. It is no part of `Clock.cpu`.
+# The phase in which Numba fills its tables, on first use. `Clock.cpu` does not contain this phase.
 STARTING = "start of Numba"
 
 
 class Clock(event.Listener):
-    """CPU seconds of a session and its phases; compilation and the start of Numba are apart.
+    """CPU seconds of a session and its phases; compilation and the start of Numba count apart.
 
     seconds: of each phase, without compilation; `STARTING` is one of them.
     compiling: CPU time (user + system, all threads) of compilation.

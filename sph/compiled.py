@@ -1,4 +1,4 @@
-"""What all compiled code shares: flags, verbs of the models, vectorisable minimum and maximum."""
+"""Compiler flags, calls of model methods (verbs), and vectorisable minimum and maximum."""
 
 import inspect
 from collections.abc import Callable
@@ -25,9 +25,9 @@ FLAGS: dict[str, Any] = {"fastmath": FASTMATH, "error_model": "numpy"}
 COMPILED: dict[str, Any] = {"cache": True, "nogil": True, **FLAGS}
 
 
-# For functions with floating-point sums that others call. Where a callee is not inlined there are
-# two copies of it, compiled in different company, which may round differently: the process that
-# compiles calls one, and a process that finds the caller in the cache the other.
+# For functions with floating-point sums that other compiled functions call. A function that is not
+# inlined exists in two compiled copies, which may round differently: the process that compiles the
+# caller uses one copy, and a process that finds the caller in the cache uses the other.
 INLINED: dict[str, Any] = {**FLAGS, "forceinline": True}
 
 
@@ -39,7 +39,7 @@ def verb(stub: Verb) -> Verb:
 
     A model (kernel, equation of state, viscosity) is a NamedTuple whose methods are its formulas:
     called from Python they work on NumPy arrays, called from compiled code they are inlined.
-    The method's parameters must have the stub's names. A new model is a new class, nothing else.
+    The method's parameters must have the stub's names. A new model needs only a new class.
     """
     name = stub.__name__
     parameters = list(inspect.signature(stub).parameters)

@@ -152,8 +152,8 @@ def check_part(part: Any, kind: type[Part], optional: bool) -> None:
         raise _wrong(kind, f"described() returned {described!r:.60}, expected a pair of lists")
     if optional:
         _check_restart(part, kind)
-    elif missing := [name for name in ("models", "starting_models") if not hasattr(part, name)]:
-        raise _wrong(kind, f"{', '.join(missing)} missing: expected the models of its passes")
+    elif not hasattr(part, "models"):
+        raise _wrong(kind, "models missing: expected the models of its passes")
 
 
 def _check_field(kind: type[Part], field: Field) -> None:

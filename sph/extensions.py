@@ -1,7 +1,8 @@
-"""Files of users that are found like those of sph: the package `sph_extensions` on the Python path.
+"""Models, parts and problems of users: the package `sph_extensions` on the Python path.
 
-The package mirrors the folders of sph: sph_extensions/kernels/mine.py is a kernel. It has no
-__init__.py, so that several places may hold a share of it.
+The package has the same folders as sph: sph_extensions/kernels/mine.py is a kernel. It has no
+__init__.py (it is a namespace package), so several directories of the Python path may each contain
+a folder `sph_extensions`.
 """
 
 import importlib
@@ -15,7 +16,7 @@ PACKAGE = "sph_extensions"
 
 
 def counterpart(package: str) -> str:
-    """Return the package of users for a package of sph, e.g. "sph_extensions.kernels"."""
+    """Return the user's counterpart of a package, e.g. "sph_extensions.kernels"."""
     return package.replace("sph", PACKAGE, 1)
 
 
@@ -23,7 +24,7 @@ def exists(package: str) -> bool:
     """Return whether a package can be imported."""
     try:
         return importlib.util.find_spec(package) is not None
-    except ModuleNotFoundError:  # of a package above it
+    except ModuleNotFoundError:  # a package above does not exist
         return False
 
 

@@ -4,7 +4,7 @@ from typing import Annotated, Any, NamedTuple, get_args, get_origin, get_type_hi
 
 
 class Parameter(NamedTuple):
-    """Annotation of a model's parameter: its help text and bounds.
+    """Annotation of a model's parameter: its help text and bounds. For example
 
     strength: Annotated[float, Parameter("1 is the value of the paper", at_least=0.0)] = 1.0
     """
@@ -15,12 +15,13 @@ class Parameter(NamedTuple):
 
 
 class Model:
-    """Base of all models. Packages of models extend it with defaults for theirs.
+    """Base class of all models. Each package of models has a subclass with its own defaults.
 
-    A NamedTuple cannot inherit, so `@model(Base)` copies what the class does not define.
+    A NamedTuple cannot inherit from another class. The decorator `@model(Base)` therefore copies
+    the attributes of `Base` that the NamedTuple does not define.
     """
 
-    name = ""  # of the file, as in the configuration
+    name = ""  # the name of the model's file, as in the configuration
     _is_model = True
 
     @classmethod
@@ -48,7 +49,7 @@ def model(base: type):
 
 
 def parameters(kind: Any) -> dict[str, tuple[Any, Parameter]]:
-    """Return type and declaration of each parameter of a model's class."""
+    """Return the type and the `Parameter` of each parameter of a model's class, by name."""
     hints = get_type_hints(kind, include_extras=True)
     return {key: _declared(key, hints[key]) for key in kind._fields}
 

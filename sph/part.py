@@ -1,9 +1,9 @@
 """The protocol of a part: a piece of physics with its fields, passes, limits, sums and keys.
 
-Every scene has one formulation (`sph.formulations`), which is a part, and optional parts, the
-folders of `sph.parts`. Each method below has a default that does nothing, so a part defines only
-what it needs. The simulation, checkpoints, history, errors and configuration use these declarations
-and contain no physics.
+Every scene has one formulation (`sph.formulations`), which is also a part, and any number of
+optional parts (the folders of `sph.parts`). Each method below has a default that does nothing, so a
+part defines only the methods that it needs. The simulation, checkpoints, history, errors and
+configuration call these methods and contain no physics themselves.
 """
 
 from collections.abc import Callable, Mapping
@@ -17,10 +17,11 @@ from sph.state import Field, State
 class Key(NamedTuple):
     """A key of [physics]: its help text, type, default, bounds and class in a restart.
 
-    kind: the type of a plain value, such as float or Literal["mass", "number"]; None where only a
-    model may be given. models: the folder whose files may be named, with their parameters in a
-    table; label: the entry of that table that holds the name. With a `default` of None and no
-    value given the part is left out. restart: a name of `sph.config.restarts.CLASSES`.
+    kind: the type of a plain value, such as float or Literal["mass", "number"]; None if the value
+    must be a model. models: the folder with the models that the value may name, alone or in a table
+    with parameters; label: the entry of that table that holds the name. If `default` is None and
+    the configuration gives no value, the run has no such part. restart: the class of the key in a
+    restart, one of `sph.config.restarts.CLASSES`.
     """
 
     name: str
@@ -32,7 +33,7 @@ class Key(NamedTuple):
     at_most: float | None = None
     models: str = ""
     label: str = "name"
-    default_model: str = ""  # of a table that does not name one
+    default_model: str = ""  # for a table that names no model
     label_help: str = ""
     example: Any = None
     restart: str = "recorded"
@@ -41,9 +42,10 @@ class Key(NamedTuple):
 class Rule(NamedTuple):
     """Time integration of a quantity, in place, for arrays of equal shape.
 
-    predict(dt, value, rate, mass, predicted): half a step in value, a full step in predicted;
-    correct(dt, value, rate, mass): the second half step with the new rate. Both return the energy
-    added beyond the rate, summed over particles.
+    predict(dt, value, rate, mass, predicted): advances `value` by half a step, and sets `predicted`
+    to the value after a full step; correct(dt, value, rate, mass): advances `value` by the second
+    half step, with the new rate. Both functions return the energy that they added in addition to
+    the rate, summed over particles.
     """
 
     predict: Callable[..., float]
@@ -59,50 +61,51 @@ class Evolved(NamedTuple):
     rule: Rule
 
 
-# When in a step a pass runs: density and what follows from it, gradients between density and
-# rates, the rates, and what is added to them.
+# The stages of a step, in order: density and quantities that follow from it; gradients, which need
+# the density; rates of change; additions to the rates.
 STAGES = ("density", "gradients", "rates", "additions")
 
 
 class Pass(NamedTuple):
     """A computation over all particles between prediction and correction.
 
-    run(sweep) performs it (`sph.passes.Sweep`). `reads` and `writes` name fields; every value of a
-    written field is set. Fields that a step writes before reading are not reordered.
+    run(sweep) performs the computation (`sph.passes.Sweep`). `reads` and `writes` name fields; the
+    pass must set every value of each field in `writes`. A field that each step writes before it
+    reads it is not reordered when the memory order of particles changes.
     """
 
     stage: str
-    phase: str  # of the clock
+    phase: str  # in the CPU seconds by phase (`sph.clock`)
     run: Callable[[Any], None]
     reads: tuple[str, ...]
     writes: tuple[str, ...]
-    widens: bool = False  # may request wider lists, and is then repeated
+    widens: bool = False  # may request wider neighbour lists; the pass is then repeated
     at_start: bool = True  # also run before the first step
 
 
 class Part:
-    """Optional physics, or a formulation. `name` is that of its folder."""
+    """Optional physics, or a formulation. `name` is the name of its folder."""
 
     name: ClassVar[str] = ""
-    title: ClassVar[str] = ""  # in the lists of what is compiled in and left out
-    # Fields that it declares in some scenes only, and that no other part may declare in any.
+    title: ClassVar[str] = ""  # for the lists of compiled and omitted physics (dry run, summary)
+    # Fields that the part declares in some scenes only. No other part may declare them in any.
     reserves: ClassVar[tuple[str, ...]] = ()
     keys: ClassVar[tuple[Key, ...]] = ()
-    formulations: ClassVar[tuple[str, ...]] = ()  # that it can join; empty: every one
-    # Whether an exact solution without the part stays the solution with it (numerical terms do).
+    formulations: ClassVar[tuple[str, ...]] = ()  # that the part works with; empty: all
+    # Whether the part changes the exact solution. Numerical terms such as viscosity do not.
     changes_solution: ClassVar[bool] = True
-    # Whether pressure varies in equilibrium with it.
+    # Whether a force of this part balances a pressure gradient in equilibrium.
     balances_pressure: ClassVar[bool] = False
 
     fields: tuple[Field, ...] = ()
     evolved: tuple[Evolved, ...] = ()
     passes: tuple[Pass, ...] = ()
     terms: Mapping[str, Any] = {}  # models that the formulation's pair loops call, by their role
-    needs: tuple[str, ...] = ()  # fields that it asks the formulation for
+    needs: tuple[str, ...] = ()  # fields that the formulation must compute for this part
     columns: tuple[str, ...] = ()  # of the history: the names in `energies` and `sums`
     keeps_momentum: bool = True
     bounds_acceleration: bool = False  # whether |a| bounds the step
-    adds_energy: bool = False  # whether `split` may
+    adds_energy: bool = False  # whether `split` may add energy
 
     def __init_subclass__(cls) -> None:
         cls.name = cls.__module__.rpartition(".")[2]
@@ -121,24 +124,24 @@ class Part:
         return []
 
     def described(self) -> tuple[list[str], list[tuple[str, str]]]:
-        """Return descriptions of what is compiled, and (what, why) of what is left out."""
+        """Return descriptions of the compiled physics, and (what, why) for omitted physics."""
         return [self.title], []
 
     # --- state ---
 
     def start(self, state: State) -> None:
-        """Set the part's own fields of the initial state, which are zeros."""
+        """Set the part's own fields in the initial state; they are zero before the call."""
 
     def remake(self, state: State, missing: list[str]) -> None:
-        """Set the fields `missing` in a checkpoint, which are zeros."""
+        """Set the fields that a checkpoint does not contain; they are zero before the call."""
 
     # --- a step ---
 
     def split(self, state: State, dt: float) -> float:
-        """Advance the state by this part alone for dt, half a step (Strang splitting).
+        """Advance the state by this part alone for dt, which is half a step (Strang splitting).
 
-        Called at the beginning and end of each step, for sources that would limit the step. Returns
-        the energy added.
+        For sources whose time scale is shorter than the time step. Called at the beginning and at
+        the end of each step. Returns the energy added.
         """
         return 0.0
 
@@ -146,17 +149,20 @@ class Part:
         """Apply `split` to the predicted values."""
 
     def largest_courant(self) -> tuple[float, str]:
-        """Return the Courant number above which this part is unstable, and its criterion."""
+        """Return the largest stable Courant number with this part, and the criterion's name."""
         return np.inf, ""
 
     def step_limit(self, state: State) -> np.ndarray | None:
-        """Return the longest step (N,) that each particle allows, or None; criterion `name`."""
+        """Return the longest time step (N,) that each particle allows, or None for no limit.
+
+        The criterion has the name of the part.
+        """
         return None
 
-    # --- what the history records ---
+    # --- columns of the history ---
 
     def energies(self, state: State) -> dict[str, np.ndarray]:
-        """Return energies per unit mass (N,) in the total energy, by column of the history."""
+        """Return energies per unit mass (N,) by column; each is a part of the total energy."""
         return {}
 
     def sums(self, state: State) -> dict[str, float]:
@@ -173,12 +179,14 @@ class Part:
         return f"the limit of physics.{self.name}" if criterion == self.name else None
 
     def held_words(self, criterion: str) -> str | None:
-        """Return what reduces the Courant number by that criterion, or None for others."""
+        """Return which setting reduces the Courant number; None unless by this criterion."""
         return None
 
     def remedies(self, trouble: str, held_by: str) -> list[str]:
-        """Return what to try against "long steps", "short steps", "drift" or "endless energy".
+        """Return what to try against a trouble, for the end of an error message.
 
-        held_by: the criterion that sets the Courant number or, for short steps, the step.
+        trouble: "long steps" (too long for stability), "short steps" (too short to finish), "drift"
+        (of energy) or "endless energy" (not finite). held_by: the criterion that sets the Courant
+        number or, for "short steps", the time step.
         """
         return []

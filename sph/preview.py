@@ -35,13 +35,15 @@ class Sample(NamedTuple):
 
 
 def describe(config: Config) -> str:
-    """The scene in words: parts, particles, memory, and the number of steps at an early step size.
+    """Return a text on the scene, the particles, the memory and the expected number of steps.
 
-    Makes a few steps and discards them. Beyond MOST_BUILT particles it runs fewer particles and
-    scales memory and cost with N, the step with N^(-1/D). Raises NumericalError where the run could
-    not start.
+    Makes a few steps and discards them. For more than MOST_BUILT particles the steps use fewer
+    particles, and memory and cost are scaled with N, the time step with N^(-1/D). Raises
+    NumericalError if the run could not start.
     """
-    standard_streams.note("preparing: a new kind of scene compiles its code, for up to a minute")
+    standard_streams.note(
+        "preparing a few steps; the first use of new settings compiles code, for up to a minute"
+    )
     sample, is_whole = _sampled(config)
     particles = sample.particles if is_whole else config.problem.n
     ratio = particles / sample.particles
@@ -62,12 +64,12 @@ def describe(config: Config) -> str:
         *scaled,
         f"Particles: {_count(particles, is_whole)}, {sample.neighbours:.0f} neighbours each.",
         f"Memory: {memory / 1e6:.1f} MB for the particles and their lists "
-        f"({memory / particles:.0f} bytes each), beside some 250 MB for Python and Numba.",
+        f"({memory / particles:.0f} bytes each), in addition to 250 MB for Python and Numba.",
         f"First step: {first:.4g}, set by the {sample.limit.criterion.replace('_', ' ')}{whose}; "
-        f"step {sample.steps} is {dt:.4g}: at that size {_count(steps, is_whole)} steps to "
+        f"step {sample.steps} is {dt:.4g}: at that size {_count(steps, is_whole)} steps reach "
         f"t = {config.time.end:g}.",
-        f"Time: a step costs {per_step:.2g} CPU s, so some {per_step * steps:.2g} CPU s in all on "
-        f"{threads_of(config)} thread(s), if steps keep this size.",
+        f"Time: a step costs {per_step:.2g} CPU s, and all steps about {per_step * steps:.2g} "
+        f"CPU s on {threads_of(config)} thread(s).",
         f"Output: {outputs} checkpoints.",
     ]
     return "\n".join(lines)

@@ -1,7 +1,7 @@
 """Discovery of kernels, equations of state, schemes, parts and problems by folder.
 
 Users may add choices in a package `sph_extensions` on the Python path (`sph.extensions`): a file
-sph_extensions/kernels/mine.py is found like sph/kernels/mine.py.
+sph_extensions/kernels/mine.py works like sph/kernels/mine.py.
 """
 
 import functools
@@ -14,14 +14,14 @@ from sph import declarations, extensions
 from sph.errors import DeclarationError
 from sph.part import Part
 
-_known: dict[tuple, str] = {}  # modules of model classes, by what Numba tells them apart by
+_known: dict[tuple, str] = {}  # module of each model class, by the names that identify it to Numba
 
 
 def names(package: str, folders: bool = False) -> list[str]:
-    """Return the choices in `package`, e.g. names("sph.kernels"): the names of its modules.
+    """Return the names of the choices in `package`, e.g. names("sph.kernels"), sorted.
 
-    folders: whether subpackages are choices as well, e.g. parts. Files whose name begins with an
-    underscore or is "base" are shared code, not choices.
+    folders: whether subpackages are choices too, as in "sph.parts". A file whose name begins with
+    an underscore, or is base.py, holds shared code and is not a choice.
     """
     return sorted(_places(package, folders))
 
@@ -42,9 +42,9 @@ def load(package: str, name: str, folders: bool = False) -> ModuleType:
 def model_class(package: str, name: str) -> type:
     """Return the NamedTuple that a model's file defines.
 
-    Raises DeclarationError if the class is declared wrongly, or if another model has equal class
-    and field names: Numba distinguishes named tuples only by these, so both models would share
-    their formulas.
+    Raises DeclarationError if the class is declared wrongly, or if another model has the same class
+    name and field names: Numba identifies a NamedTuple by these names alone, so both models would
+    use the formulas of one of them.
     """
     module = load(package, name)
     found: Any = declarations.only_class(
@@ -61,7 +61,7 @@ def model_class(package: str, name: str) -> type:
     if not hasattr(found, "_is_model"):
         raise DeclarationError(
             f"{module.__name__}: decorate {found.__name__} with @model(Base) of sph.model, where "
-            f"Base is the class in {package} that has what a model may leave out"
+            f"Base is the class in {package} with the defaults of its models"
         )
     declarations.check_model(found, importlib.import_module(package))
     other = _known.setdefault((found.__name__, found._fields), module.__name__)

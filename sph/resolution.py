@@ -1,4 +1,4 @@
-"""Check that float64 resolves positions (against the particle spacing) and velocities (against c).
+"""Check that float64 resolves positions and velocities.
 
 The gap between a float64 number and the next grows with the number (`np.spacing`). Far from 0 it
 becomes a noticeable fraction of the particle spacing, and in fast bulk motion of the speed of

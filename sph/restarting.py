@@ -1,4 +1,4 @@
-"""Restart from a checkpoint, bit for bit as if the run had not stopped if no setting changes."""
+"""Restart from a checkpoint, bit for bit as without a stop if no setting changes."""
 
 import dataclasses
 from collections.abc import Sequence

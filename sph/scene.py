@@ -1,4 +1,4 @@
-"""A scene: the parts and models that a configuration selects, in the form the engine uses."""
+"""A scene: the parts and models that a configuration selects, as the simulation uses them."""
 
 import math
 from dataclasses import dataclass
@@ -42,7 +42,7 @@ class Scene:
 
     @cached_property
     def parts(self) -> tuple[Part, ...]:
-        """The optional physics that the scene has."""
+        """The optional parts of the scene."""
         asked = [(kind.of(self), kind) for kind in parts.classes(self.physics.formulation)]
         there = [(part, kind) for part, kind in asked if part is not None]
         for part, kind in there:
@@ -58,19 +58,19 @@ class Scene:
 
     @cached_property
     def all_parts(self) -> tuple[Part, ...]:
-        """The formulation, then the other parts. Raises DeclarationError."""
+        """The formulation, followed by the optional parts. Raises DeclarationError."""
         found = (self.formulation, *self.parts)
         declarations.check_together(found, self.physics.kinds, self.formulation.roles)
         return found
 
     @cached_property
     def fields(self) -> tuple[Field, ...]:
-        """Every array of the state."""
+        """The declarations of all arrays of the state."""
         return tuple(field for part in self.all_parts for field in part.fields)
 
     @cached_property
     def passes(self) -> tuple[Pass, ...]:
-        """The passes of a step, in their order."""
+        """The passes of a step, in the order in which they run."""
         found = [one for part in self.all_parts for one in part.passes]
         return tuple(sorted(found, key=lambda one: STAGES.index(one.stage)))
 
@@ -87,7 +87,7 @@ class Scene:
 
     @cached_property
     def columns(self) -> tuple[str, ...]:
-        """The columns of the history that not every scene has."""
+        """The columns of the history that only some scenes have."""
         found = ["held_supports"] * (self.max_support < math.inf)
         found += ["volume_ratio"] * self.is_filled
         found += [name for part in self.all_parts for name in part.columns]
@@ -95,7 +95,7 @@ class Scene:
 
     @cached_property
     def is_filled(self) -> bool:
-        """Whether gas fills a box without open sides, so that sum m/rho must equal its volume."""
+        """Whether gas fills a closed box, so that sum m/rho must equal the volume of the box."""
         return self.config.problem.fills_box(self.eos) and "open" not in self.domain.boundaries
 
     @property
@@ -107,7 +107,7 @@ class Scene:
 
     @cached_property
     def step_bounds(self) -> Bounds:
-        """Limits on the time step from the configuration."""
+        """The limits on the time step that the configuration determines."""
         physics = self.physics
         held, criterion = physics.C, "signal_speed"
         for part in self.parts:
@@ -140,7 +140,7 @@ class Scene:
             ) from error
 
     def described(self) -> tuple[list[str], list[str]]:
-        """Return descriptions of the parts that are compiled, and of those left out and why."""
+        """Return descriptions of the compiled physics, and of the omitted physics with reasons."""
         inside = [f"{self.dimension}-D, {len(self.domain.images.sign)} image(s) of the box"]
         outside = []
         for part in self.all_parts:

@@ -1,4 +1,4 @@
-"""The simulation: the loop over steps. The physics is that of the scene's parts."""
+"""The simulation: one time step after another. The parts of the scene hold the physics."""
 
 import numpy as np
 from numba.core.registry import cpu_target
@@ -15,7 +15,8 @@ from sph.state import State
 from sph.threads import Team
 from sph.watchdog import Watchdog
 
-# Each widening extends lists at least to the requested radius, which grows at most by a factor 2.
+# Each widening extends lists at least to the requested radius. A request is at most twice the
+# radius of the last one.
 MAX_WIDENINGS = 60
 
 
@@ -29,7 +30,7 @@ class Simulation:
 
     def __init__(self, scene: Scene, particles: State, threads: int, clock: Clock):
         with clock.phase(STARTING):
-            # Numba fills its tables on first use; done here, so that no other phase is charged
+            # Numba fills its tables on first use. Filled here, they add no time to other phases.
             cpu_target.target_context.refresh()
         self.scene = scene
         self.particles = particles
@@ -43,10 +44,10 @@ class Simulation:
         self.held_supports = 0  # number of particles whose support is limited by max_support
         self.limit = None
         self.totals = None
-        self.baseline = None  # of the energy drift: set at the start, or by `go_on_from`
+        self.baseline = None  # reference of the energy drift; set at the start or by `go_on_from`
         self.energy_drift = 0.0
-        self.energy_added = 0.0  # by sources, since the run began
-        self.energy_injected = 0.0  # to keep internal energies positive, since the run began
+        self.energy_added = 0.0  # by sources such as heating, since the start of the run
+        self.energy_injected = 0.0  # to keep internal energies positive, since the start
         self.watchdog = Watchdog(scene)
         missing = particles.declare(scene.fields)
         for part in scene.all_parts:
@@ -57,7 +58,9 @@ class Simulation:
             field for field in scene.fields if field.rank and field.name in self._carried
             and field.name != "position"
         ]  # fmt: skip
-        self._sweep = passes.Sweep(particles, self.team, number_of_blocks(particles.number))
+        self._sweep = passes.Sweep(
+            particles, self.team, number_of_blocks(particles.number), scene.formulation.models
+        )
 
     @classmethod
     def start(cls, scene: Scene, threads: int, clock: Clock) -> "Simulation":
@@ -81,13 +84,13 @@ class Simulation:
         resolution.check_extent(self)
         leapfrog.keep(self.particles, self.evolved)
         self._build_lists(dt=0.0, guess=True)
-        self._sweep.models = self.scene.formulation.starting_models
+        self._sweep.is_start = True
         for one in self.scene.passes:
             if one.at_start:
                 self._make(one)
             if one.widens:
                 resolution.check(self)
-        self._sweep.models = self.scene.formulation.models
+        self._sweep.is_start = False
         declarations.check_returned(self.scene.all_parts, self.particles)
         self._measure(past=None)
         self.check_fields()
@@ -106,7 +109,6 @@ class Simulation:
         self.limit = step_size.StepLimit(next_step, 0, "checkpoint")
         with clock.phase("lists"):
             self.search.build(origin, particles.id)
-        self._sweep.models = scene.formulation.models
         declarations.check_returned(scene.all_parts, particles)
         self.totals = totals.of(particles, scene.all_parts, scene.keeps_momentum)
         anew = totals.Budget(0.0, 0.0, totals.Baseline.at(self.totals, 0.0))
@@ -120,18 +122,18 @@ class Simulation:
         return totals.Budget(self.energy_injected, self.energy_added, baseline)
 
     def go_on_from(self, budget: totals.Budget) -> None:
-        """Continue the counts of energy in `budget`, and measure energy drift from its baseline."""
+        """Continue the energy sums of `budget`, and measure energy drift from its baseline."""
         self.energy_injected, self.energy_added, self.baseline = budget
         self.energy_drift = self.baseline.drift(self.totals, self.energy_added)
 
     def advance(self, until: float) -> None:
-        """Take one step (steps 1-9 of docs/equations.md), cut to end at `until` at the latest.
+        """Take one time step (steps 1-9 of docs/equations.md), which ends at `until` or earlier.
 
         Raises NumericalError if the new state is unphysical.
         """
         allowed = self.limit.dt
         dt, landing = allowed, False
-        # a remainder of a billionth of a step is rounding, not a step
+        # a rest of a billionth of a step is a rounding error: this step covers it
         if self.time + dt * (1 + 1e-9) >= until:
             dt, landing = until - self.time, True
         p, sweep = self.particles, self._sweep
@@ -165,7 +167,7 @@ class Simulation:
         return self.totals.volume / self.scene.domain.volume if self.scene.is_filled else None
 
     def nearest(self) -> np.ndarray:
-        """Return the distance (N,) of each particle to its nearest neighbour, in spacings.
+        """Return the distance (N,) to the nearest neighbour, in particle spacings.
 
         inf if there is no neighbour within the support radius.
         """
@@ -248,7 +250,7 @@ class Simulation:
             raise faults.crowded(self)
 
     def _split(self, dt: float) -> None:
-        """Apply the parts that are split from the flow for half a step."""
+        """Apply the sources that are integrated apart from the flow, for half a step."""
         for part in self.scene.all_parts:
             self.energy_added += part.split(self.particles, dt)
 

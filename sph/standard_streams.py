@@ -1,4 +1,4 @@
-"""Standard output and error. Output that cannot be written is dropped, and the run continues."""
+"""Standard output and error; output that cannot be written is dropped."""
 
 import io
 import os

@@ -1,6 +1,7 @@
-"""The state: named arrays with one entry per particle, each declared once by the part that owns it.
+"""The state: named arrays (fields) with one entry per particle.
 
-The declaration determines signs at mirrors, reordering, checkpoints, public names and units.
+The part that owns a field declares it once. The declaration determines the sign changes at mirrors,
+the memory order, the contents of checkpoints, and the public names and units.
 """
 
 from collections.abc import Iterable, Mapping
@@ -24,23 +25,24 @@ class Field(NamedTuple):
     """The declaration of an array.
 
     rank: 0 for a scalar (N,), 1 for a vector (D, N), 2 for a tensor (D, D, N). A reflecting wall
-    changes the sign of a vector's component, and of a tensor's mixed components.
+    changes the sign of a vector's component normal to the wall, and of a tensor's components with
+    one normal and one tangential index.
     """
 
     name: str
     rank: int = 0
-    stored: bool = True  # in checkpoints; else a work array
-    remade: bool = False  # a restart can compute it, so it may be missing in a checkpoint
+    stored: bool = True  # in checkpoints; False for a work array
+    remade: bool = False  # a restart can compute the field if a checkpoint does not contain it
     above: float | None = None  # bounds of a physical value
     at_least: float | None = None
-    integer: bool = False  # the ID alone
+    integer: bool = False  # int64; only the ID
     public: Public | None = None
 
     def shape(self, dimension: int, number: int) -> tuple[int, ...]:
         return (dimension,) * self.rank + (number,)
 
 
-# What every formulation has.
+# The fields of every formulation.
 COMMON = (
     Field(
         "id",
@@ -77,26 +79,26 @@ COMMON = (
     Field("energy_rate"),
     Field("predicted_velocity", rank=1, stored=False),  # at the full step (eqs 4 and 5)
     Field("predicted_energy", stored=False),
-    Field("support_before", stored=False),  # H of the step before
+    Field("support_before", stored=False),  # support radius of the last step
     Field("sound_speed", stored=False),
-    Field("signal_speed", stored=False),  # the largest of the particle's pairs (eq 32)
+    Field("signal_speed", stored=False),  # the largest v_sig of the particle's pairs (eq 32)
 )
 
 
 class State:
     """N particles in D dimensions: one attribute per field, float64 except IDs, in code units.
 
-    The memory order is that of the neighbour blocks and changes when these are rebuilt. `id` (from
-    1) identifies a particle during the whole run.
+    Particles are stored in the order of the neighbour blocks. The order changes when the blocks are
+    rebuilt; `id` (from 1) identifies a particle during the whole run.
     """
 
     def __init__(self, fields: Iterable[Field], arrays: Mapping[str, np.ndarray]):
-        """Create a state with the `fields` that are in `arrays`, in the order of declaration."""
+        """Create a state with those `fields` that `arrays` contains, in the order of `fields`."""
         self.fields = tuple(field for field in fields if field.name in arrays)
         for field in self.fields:
             setattr(self, field.name, arrays[field.name])
 
-    if TYPE_CHECKING:  # the fields, which parts declare
+    if TYPE_CHECKING:  # an attribute for each field; parts declare the fields
 
         def __getattr__(self, name: str) -> np.ndarray: ...
 
@@ -133,7 +135,7 @@ class State:
         return self.__dict__.get(name)
 
     def declare(self, fields: Iterable[Field]) -> list[str]:
-        """Keep exactly these fields; add missing ones as zeros and return their names."""
+        """Keep exactly these fields; add missing fields as zeros and return their names."""
         fields, known = tuple(fields), {field.name for field in self.fields}
         for name in known - {field.name for field in fields}:
             delattr(self, name)
@@ -154,7 +156,7 @@ class State:
         return State(self.fields, chosen)
 
     def by_id(self) -> "State":
-        """Return a copy in order of ID, to compare runs or to plot."""
+        """Return a copy in the order of IDs, for comparing runs and for plots."""
         return self.subset(np.argsort(self.id, kind="stable"))
 
     def reorder(self, order: np.ndarray, names: Iterable[str]) -> None:

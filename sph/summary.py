@@ -1,4 +1,4 @@
-"""The figures of a run, as summary.json holds them: each name, meaning and unit stands here alone.
+"""The figures of a run in summary.json: the only definition of each name and unit.
 
 Code units unless a unit is given. `sph.analysis.summary` computes the figures; every reader of
 summary.json takes `of_json` and these names.

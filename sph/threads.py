@@ -1,7 +1,7 @@
 """A team of threads that share a pass over blocks of particles.
 
 Compiled passes release Python's global interpreter lock, so ordinary threads run them in parallel.
-Each particle is written by exactly one range, so results do not depend on the number of threads.
+Each particle belongs to exactly one range, so results do not depend on the number of threads.
 """
 
 import itertools

@@ -1,4 +1,4 @@
-"""The watchdog: checks after each step that the state of a simulation is finite and physical.
+"""The watchdog: checks after each step that the state is finite and physical.
 
 Most checks use sums that the history needs anyway. Individual particles are examined only after a
 check has failed, in open domains, and for gas that can be under tension.
@@ -152,7 +152,7 @@ class Watchdog:
         raise fault(
             simulation,
             f"the densities do not fit the box: the sum of m/rho is {ratio:.3g} of its volume",
-            "a larger physics.eta, as kernels reach too few neighbours, or more particles",
+            "a larger physics.eta, so that kernels contain more neighbours, or more particles",
             0,
         )
 

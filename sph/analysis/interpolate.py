@@ -1,4 +1,4 @@
-"""Fields of particles interpolated by their own kernels: at points, and on the pixels of a plane.
+"""Interpolation of particle fields with the kernels: at points and on pixels of a plane.
 
 A(x) = sum_j V_j A_j W(x - x_j, H_j) / sum_j V_j W(x - x_j, H_j), V = m/rho, over particles and
 their images (Shepard 1968): a constant field stays constant. NaN where no kernel reaches.

@@ -1,4 +1,4 @@
-"""Compute the summary of a run, and say it in words. `sph.summary` says what each figure is."""
+"""The summary of a run, as figures and as text. `sph.summary` defines each figure."""
 
 import resource
 import sys
@@ -76,7 +76,7 @@ def warn(summary: Summary, simulation) -> None:
 
 
 def conservation(history, particles, scene, start: Baseline) -> Conservation:
-    """What the run conserved, from its history, its last state, its scene and its baseline."""
+    """Return how well the run conserved energy, momentum and volume."""
     drift = history["energy_drift"]
     ratio = history.get("volume_ratio")
     return {
@@ -152,7 +152,7 @@ def _percent(relative: float | None) -> str:
 
 
 def in_words(summary: Summary) -> str:
-    """The closing words of a run: its end, warnings, errors, conservation and cost."""
+    """Return the closing text of a run: its end, warnings, errors, conservation and cost."""
     lines = [
         f"{summary['problem']}: {summary['particles']} particles to t = {summary['time']:.6g} "
         f"in {summary['steps']} steps ({_ending(summary)}).",
@@ -199,12 +199,12 @@ def _kept_in_words(kept: Conservation) -> str:
     if injected:
         parts[0] += f" ({injected:.2g} of it to keep internal energies positive)"
     parts.append(
-        "momentum is not conserved at walls or in a field"
+        "momentum is not conserved at walls or in an external field"
         if change is None
         else f"momentum to {change:.2g}"
     )
     if ratio is not None:
-        parts.append(f"sum m/rho is {ratio:.4g} of the volume")
+        parts.append(f"at the end sum m/rho is {ratio:.4g} of the volume")
     return f"Conserved, at worst over the run: {'; '.join(parts)}."
 
 
@@ -212,7 +212,7 @@ def _cost_in_words(cost: Cost) -> str:
     session = cost["session"]
     rate = session["updates_per_cpu_second"] or 0
     return (
-        f"Cost: {session['wall_seconds']:.3g} s, {session['cpu_seconds']:.3g} CPU s on "
-        f"{cost['threads']} thread(s), and {session['compile_cpu_seconds']:.2g} CPU s for "
+        f"Cost: elapsed time {session['wall_seconds']:.3g} s, {session['cpu_seconds']:.3g} CPU s "
+        f"on {cost['threads']} thread(s), and {session['compile_cpu_seconds']:.2g} CPU s for "
         f"compilation; {rate:,} particle updates per CPU-second."
     )

@@ -55,7 +55,7 @@ def load(path: str | Path, overrides: Sequence[str] = ()) -> Config:
     return _resolve(reading.parse(reading.read(path), str(path)), overrides)
 
 
-def from_text(text: str, source: str = "checkpoint") -> Config:
+def from_text(text: str, source: str = "the configuration") -> Config:
     """Return the configuration of an existing run from its TOML text. Raises ConfigError.
 
     source: name of the text in error messages.

@@ -1,4 +1,4 @@
-"""Types of keys whose value names a file in a package: a scheme, a kernel, an equation of state."""
+"""Types of keys whose value names a file in a package, such as a scheme or a kernel."""
 
 import functools
 import types
@@ -39,12 +39,14 @@ class Choice:
 class ModelChoice(Choice):
     """Annotates a key whose value is a name, or a table { name, parameters of that model }.
 
-    The resolved value is the name alone for a model without parameters, otherwise a table with the
+    The resolved value is the name alone if the model has no parameters, otherwise a table with the
     name and every parameter.
     """
 
     def describe(self) -> str:
-        return super().describe() + ", or a table { name, parameters }"
+        classes = (registry.model_class(self.package, name) for name in self.valid_names())
+        table = ", or a table { name, parameters }" if any(one._fields for one in classes) else ""
+        return super().describe() + table
 
     def parameters(self, name: str) -> type[Section]:
         """Return a Section class with one key for each parameter of the model `name`."""

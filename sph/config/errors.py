@@ -143,6 +143,8 @@ def describe(annotation: Any, plural: bool = False) -> str:
         return f"{'lists' if plural else 'a list'} of {_length(said)}{entries}"
     if _is_table(bare):
         return "a table { " + ", ".join(bare.model_fields) + " }"
+    if typing.get_origin(bare) is dict:
+        return "a table"
     if bare is bool:
         return "true or false"
     noun = _NOUNS.get(bare, "value")
@@ -180,6 +182,8 @@ def inner(annotation: Any, path: Path) -> Any:
             bare, _ = _plain(branch)
             if isinstance(step, int) and typing.get_origin(bare) is list:
                 found.append(typing.get_args(bare)[0])
+            elif typing.get_origin(bare) is dict:
+                found.append(typing.get_args(bare)[1])
             elif _is_table(bare) and step in bare.model_fields:
                 found.append(field_annotation(bare.model_fields[step]))
         if not found:

@@ -19,7 +19,9 @@ DEFAULT = "gas"
 
 
 class Physics(Section):
-    """Equations and numerical method. All values are in code units."""
+    """Equations and numerical method, in code units. "In a restart" says how `sph restart --set`
+    may change the key: see the classes in docs/configuration.md.
+    """
 
     # The formulation and every part that can join it.
     kinds: ClassVar[tuple[type[Part], ...]] = ()
@@ -30,7 +32,7 @@ class Physics(Section):
 
     formulation: Annotated[str, Choice(FORMULATIONS, folders=True)] = Field(
         DEFAULT,
-        description="equations that are solved for density and rates",
+        description="kind of matter and its equations for density and rates of change",
         json_schema_extra=REFUSED,
     )
     kernel: Annotated[Any, ModelChoice("sph.kernels")] = Field(
@@ -81,7 +83,7 @@ class Physics(Section):
     energy_limit: bool = Field(
         True,
         description="limit the time step by C u/|du/dt|, with u the internal energy per unit "
-        "mass, so that fast changes of it are resolved",
+        "mass, so that the steps resolve fast changes of u",
         json_schema_extra=RECORDED,
     )
     max_energy_drift: float = Field(
@@ -134,7 +136,7 @@ def table(formulation: str) -> type[Physics]:
 
 
 def chosen(raw: dict[str, Any]) -> type[Physics]:
-    """Return the class of [physics] for a table as given; that of the default if it is wrong."""
+    """Return the class of [physics] for a raw table; an unknown formulation counts as default."""
     name = raw.get("formulation", DEFAULT)
     known = registry.names(FORMULATIONS, folders=True)
     return table(name if name in known else DEFAULT)

@@ -1,4 +1,4 @@
-"""Equations of state, one file each."""
+"""Equations of state, one file each: pressure and sound speed of a gas."""
 
 from collections.abc import Callable
 from typing import Any, Protocol
@@ -11,24 +11,25 @@ from sph.model import Model
 class EquationOfState(Protocol):
     """An equation of state: a file with a NamedTuple that has these methods.
 
-    They take numbers in compiled code and arrays of any one shape elsewhere; code units. A gas that
-    is ideal in P + p_inf has the attributes gamma and p_inf, for exact solutions.
+    The arguments are numbers in compiled code and arrays of equal shape elsewhere, in code units.
+    A gas with P + p_inf = (gamma - 1)(rho u - p_inf) has the attributes gamma and p_inf, which the
+    exact solutions use.
     """
 
     def pressure(self, density: Any, internal_energy: Any) -> Any:
-        """P"""
+        """Return the pressure P."""
 
     def sound_speed(self, density: Any, pressure: Any) -> Any:
-        """c_s"""
+        """Return the speed of sound c."""
 
     def internal_energy(self, density: Any, pressure: Any) -> Any:
-        """u, the inverse of `pressure`, for initial states."""
+        """Return u, the inverse of `pressure`, for initial states."""
 
 
 class Defaults(Model):
-    """What the file of an equation of state may leave out."""
+    """Defaults of an equation of state: attributes that its class need not define."""
 
-    # lowest_energy(density): u of cold gas, at and below which sound has no speed; None: u = 0
+    # lowest_energy(density): the u at which the speed of sound becomes 0; None if this is u = 0
     lowest_energy: Callable[[Any], Any] | None = None
 
     @classmethod

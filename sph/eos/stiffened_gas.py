@@ -15,13 +15,13 @@ from sph.model import Parameter, model
 
 @model(Defaults)
 class StiffenedGas(NamedTuple):
-    """`gamma`: above 1; `p_inf`: at least 0, a pressure; the gas sustains tension down to -p_inf.
+    """`gamma`: adiabatic index; `p_inf`: pressure offset. The pressure may be as low as -p_inf.
 
     The lowest u is p_inf/rho, where P = -p_inf and the sound speed is 0.
     """
 
-    gamma: Annotated[float, Parameter("the ratio of specific heats of the gas", above=1.0)]
-    p_inf: Annotated[float, Parameter("pressure that holds the gas together", at_least=0.0)]
+    gamma: Annotated[float, Parameter("adiabatic index, the ratio of specific heats", above=1.0)]
+    p_inf: Annotated[float, Parameter("pressure offset", at_least=0.0)]
 
     def pressure(self, density, internal_energy):
         return (self.gamma - 1.0) * density * internal_energy - self.gamma * self.p_inf

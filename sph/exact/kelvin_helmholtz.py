@@ -1,4 +1,4 @@
-"""Linear theory of a compressible shear layer: growth rates and the evolution of perturbations.
+"""Linear theory of a compressible shear layer: growth rates and growing perturbations.
 
 A perturbation (u, v, p)(y, t) e^(ikx) of velocity and pressure, in a stream U(y) along x of density
 R(y) at uniform pressure, obeys the linearised Euler equations of an adiabatic gas,

@@ -1,31 +1,30 @@
-"""Formulations, one folder each: the equations for density and rates.
+"""Formulations, one folder each: the equations for density and rates of change.
 
 The `__init__.py` of a folder defines one subclass of `Formulation`.
 """
 
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
 from sph.part import Part
 from sph.state import COMMON, Public, State
 
-# Derived: no array of the state.
+# Pressure is computed from the state, not stored in it.
 PRESSURE = Public("Pressures", -1, 1, -2, -5, "Pressure")
 
 
 class Formulation(Part):
-    """The part with the basic equations (`physics.formulation`), of which a scene has one."""
+    """The part with the basic equations. A scene has exactly one (`physics.formulation`)."""
 
     fields = COMMON
     roles: ClassVar[tuple[str, ...]] = ()  # of the terms that its pair loops call
-    # The models of the passes, and those of the first passes, which have no initial guess.
-    models: tuple
-    starting_models: tuple
+    # The models that passes use, among them `kernel`, `eos`, `support_ratio` (H/h) and `eta`.
+    models: Any
 
     @property
     def label(self) -> str:
-        """Name of the equations in a checkpoint."""
+        """The name of the equations that checkpoints store."""
         return self.name
 
     def pressure(self, state: State) -> np.ndarray:

@@ -1,6 +1,6 @@
-"""Prediction and correction of the leapfrog (eqs 1-6 and 29-31), in place, of all evolved fields.
+"""The leapfrog: prediction and correction of all evolved fields (eqs 1-6 and 29-31).
 
-Positive quantities such as internal energy are kept positive. If a change c would take more than
+Internal energy and other positive quantities are kept positive. If a change c would take more than
 half of u, u + c is replaced by u/2 e^(1 + 2 c/u), which has the same value and slope at c = -u/2
 and never reaches zero. This adds energy; the functions return its sum over particles, which the
 history records as energy_injected. With the time step limit u/|du/dt| this does not occur.
@@ -15,9 +15,10 @@ from sph.state import State
 
 
 def predict(state: State, evolved: tuple[Evolved, ...], dt: float) -> float:
-    """Advance positions by a full step and all else by half; write full steps to predicted fields.
+    """Advance positions by a full step, and velocities and evolved fields by half a step.
 
-    Returns the energy added beyond the rates.
+    Writes the values after a full step to the predicted fields. Returns the energy that was added
+    in addition to the rates.
     """
     s, given = state, 0.0
     _move(dt, s.position, s.velocity, s.acceleration, s.predicted_velocity)
@@ -29,7 +30,7 @@ def predict(state: State, evolved: tuple[Evolved, ...], dt: float) -> float:
 
 
 def correct(state: State, evolved: tuple[Evolved, ...], dt: float) -> float:
-    """Advance by the second half step, with the new rates. Return the energy added beyond them."""
+    """Advance by the second half step with the new rates. Return the energy added beyond these."""
     s, given = state, 0.0
     _straight_correct(dt, s.velocity, s.acceleration, s.mass)
     for one in evolved:

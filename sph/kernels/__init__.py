@@ -17,10 +17,9 @@ Dim = tuple[int, ...]  # any tuple of length D: the number of dimensions
 class Kernel(Protocol):
     """A kernel: a file with a NamedTuple that has these methods.
 
-    They have no branches, so that the pair loop vectorises. q = r/H >= 0, a number in compiled code
-    and an array of any shape elsewhere. w and its derivative come without the normalisation C,
-    which a loop applies once a particle.
-
+    The methods have no branches, so that the compiler can vectorise the pair loop. q = r/H >= 0 is
+    a number in compiled code and an array of any shape elsewhere. w and its derivative do not
+    contain the normalisation C, which a loop applies once per particle.
     """
 
     def normalisation(self, dim: Dim) -> float:
@@ -33,14 +32,15 @@ class Kernel(Protocol):
         """(dw/dq) / (q C): finite at q = 0 where the kernel is smooth."""
 
     def force_over_q(self, dim: Dim, q: Any) -> Any:
-        """The same, as it enters the pair force (eqs 22-23)."""
+        """The value that replaces dw_over_q in the pair force (eqs 22-23); usually equal to it."""
 
 
 class Defaults(Model):
-    """What a kernel's file may leave out."""
+    """Defaults of a kernel: attributes that its class need not define."""
 
-    flattened: bool = False  # whether the force keeps the gradient near the centre
-    # By dimension, the largest eta at which the particles of uniform gas stay apart
+    # whether the pair force uses a constant gradient near the centre
+    flattened: bool = False
+    # By dimension, the largest eta at which the particles of uniform gas do not form close pairs
     # (docs/measurements.md, section "Pairing").
     pairs_above: Mapping[int, float] = MappingProxyType({})
 

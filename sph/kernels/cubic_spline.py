@@ -1,4 +1,4 @@
-"""Cubic spline kernel (Monaghan & Lattanzio 1985); pairs at large eta."""
+"""Cubic spline kernel (Monaghan & Lattanzio 1985). Particles form pairs at large eta."""
 
 import math
 from typing import Annotated, NamedTuple

@@ -1,4 +1,4 @@
-"""Quintic B-spline kernel (Schoenberg 1946; Morris 1996); pairs at large eta.
+"""Quintic spline kernel (Schoenberg 1946; Morris 1996). Particles form pairs at large eta.
 
 Recommended for smooth flow, with eta below `pairs_above`.
 """

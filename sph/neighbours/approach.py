@@ -1,4 +1,4 @@
-"""Bound on the time step by pairs that are not neighbours yet but would meet within the step.
+"""Bound on the time step by pairs that are not neighbours yet but would meet within it.
 
 Eq 32 bounds a step by the approach of neighbours. Cold streams that are still apart have no
 neighbours across the gap. They could overlap by whole support radii before any pair force acts, or

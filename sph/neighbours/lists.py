@@ -1,4 +1,4 @@
-"""Candidate lists: for each block, all particles and images that may become neighbours of it.
+"""Candidate lists: for each block, all particles and images that may become neighbours.
 
 A list serves all particles of its block. It is valid until a particle has moved, or its support
 radius has grown, by more than the skin allows. A candidate is one integer: particle and image.

@@ -1,4 +1,4 @@
-"""Checkpoints: one HDF5 file with the exact state for a restart, which other tools can read too.
+"""Checkpoints: HDF5 files with the exact state for a restart, readable by other tools.
 
 The state is in the private group /Checkpoint, beside the public groups of `sph.output.layout`.
 Its datasets are the numerical state and nothing else, so two runs that agree have equal datasets;

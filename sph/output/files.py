@@ -176,9 +176,15 @@ def opened(path: Path) -> Iterator[io.FileIO]:
 
 
 def read_text(path: Path) -> str:
-    """Return the UTF-8 text in `path`. Raises FileError, FileNotFoundError, UnicodeDecodeError."""
+    """Return the UTF-8 text in `path`. Raises FileError and FileNotFoundError."""
     with opened(path) as file:
-        return file.readall().decode()
+        content = file.readall()
+    try:
+        return content.decode()
+    except UnicodeDecodeError:
+        raise FileError(
+            f"cannot read {path}: it is not UTF-8 text.\nTry: a text file that sph wrote."
+        ) from None
 
 
 # --- seals ---

@@ -185,8 +185,6 @@ def _names_and_rows(path: Path) -> tuple[list[str], list[list[str]]]:
         text = read_text(path)
     except FileNotFoundError:
         raise FileError(f"{path}: history not found.\nTry: a run directory.") from None
-    except UnicodeDecodeError as error:
-        raise FileError(f"cannot read {path}: {error}.") from error
     complete = text[: text.rfind("\n") + 1]
     names, *rows = list(csv.reader(io.StringIO(complete))) or [[]]
     if names[:2] != ["step", "t"] or len(set(names)) < len(names):

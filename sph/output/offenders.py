@@ -1,4 +1,4 @@
-"""The file offenders.h5 of a failed run: the particle at which it failed, and its neighbours."""
+"""The file offenders.h5 of a failed run: the particle that failed, and its neighbours."""
 
 from pathlib import Path
 

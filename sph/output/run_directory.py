@@ -208,11 +208,14 @@ class RunDirectory:
         """The summary of a run that has ended. Raises FileError where it cannot be read."""
         try:
             return of_json(read_text(self.summary))
+        except json.JSONDecodeError as error:
+            problem = f"line {error.lineno} is not valid JSON"
         except (OSError, ValueError, RecursionError) as error:
-            raise FileError(
-                f"{self.summary} cannot be read: {error}.\n"
-                "Try: the sph that wrote it; or `sph restart` of its directory, if it is damaged."
-            ) from None
+            problem = str(error)
+        raise FileError(
+            f"{self.summary} cannot be read: {problem}.\n"
+            "Try: the sph that wrote it; or `sph restart` of its directory, if it is damaged."
+        )
 
     def read_summary(self) -> dict:
         """Return the content of summary.json, or an empty dictionary if it cannot be read.

@@ -1,4 +1,4 @@
-"""Checks that the files in a run directory belong to one run, so that no other run is replaced."""
+"""Checks that the files in a run directory belong to one run."""
 
 import itertools
 from pathlib import Path
@@ -18,7 +18,7 @@ def check_configuration(path: Path, checkpoint: Checkpoint) -> None:
     """Raise FileError if config.toml can be read and has another problem."""
     try:
         there = configuration.from_text(read_text(path), str(path))
-    except (ConfigError, FileError, OSError, UnicodeDecodeError):
+    except (ConfigError, FileError, OSError):
         return  # missing or of another version: the checkpoint holds the configuration as well
     check_problem(path, there.problem, checkpoint.config.problem)
 

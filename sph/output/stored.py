@@ -137,7 +137,7 @@ def fields_of(text: str) -> dict[str, tuple[int, bool]]:
     try:
         found = {name: tuple(entry) for name, entry in json.loads(text).items()}
     except (ValueError, TypeError, AttributeError, RecursionError):
-        raise Refused("foreign", "its list of fields is not one") from None
+        raise Refused("foreign", "its list of fields is not a JSON object") from None
     reserved = {*SCALARS, *ENERGIES, *LISTS}
     for name, entry in found.items():
         if not NAME.fullmatch(name) or name in reserved or entry not in ENTRIES:

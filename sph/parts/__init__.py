@@ -1,6 +1,7 @@
 """Optional physics, one folder for each part (see `sph.part`).
 
-The `__init__.py` of a folder defines one subclass of `Part`, whose keys appear in [physics].
+The `__init__.py` of a folder defines one subclass of `Part`. The keys that the subclass declares
+become keys of [physics].
 """
 
 import functools

@@ -1,22 +1,24 @@
-"""What passes over the blocks' candidates share: gather only, one writer a particle, a fixed order.
+"""Passes over particles and their candidate neighbours: shared arguments and rules.
 
-A pass copies a block's candidates into contiguous scratch, images applied (`gather`), and runs
-branch-free loops over it for every particle of the block, so its results do not depend on the
-number of threads. Arguments that are None leave their part out of the compiled code.
+A pass copies the candidates of a block, with images applied, into contiguous scratch arrays
+(`gather`). It then runs loops without branches over these arrays for every particle of the block.
+Only the pass over a particle's own block writes to the particle, and candidates have a fixed order,
+so results do not depend on the number of threads. An argument that is None removes the code that
+uses the argument from the compiled pass.
 """
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from sph.state import State
 from sph.threads import Team
 
-TINY = 1e-300  # keeps 1/r finite where r_ij = 0 and what it multiplies is zero too
+TINY = 1e-300  # added to r^2: keeps 1/r finite where r_ij = 0, where its factor is zero too
 
 
 class Neighbours(NamedTuple):
-    """Candidates of all blocks, complete within reach_factor times list_support of particles."""
+    """Candidates of all blocks, complete up to reach_factor times each particle's list_support."""
 
     lists: tuple
     images: tuple
@@ -27,19 +29,20 @@ class Neighbours(NamedTuple):
 class Sweep:
     """The arguments of passes: the state, its neighbours, the models and the step.
 
-    wanted (blocks,): for a pass that widens lists. Blocks where it is 0 are passed over; the pass
-    sets it to 0, or to the multiple of list_support to which the block must be listed before it is
-    run again for it.
+    wanted (blocks,): for a pass that may request wider lists. The pass skips blocks where `wanted`
+    is 0. For each other block it sets `wanted` to 0 if the lists were wide enough, otherwise to the
+    multiple of list_support that the lists must reach before the pass is repeated for the block.
     """
 
-    def __init__(self, state: State, team: Team, blocks: int):
+    def __init__(self, state: State, team: Team, blocks: int, models: Any):
         self.state = state
         self.team = team
         self.dim = (0,) * state.dimension
         self.wanted = np.empty(blocks)
-        self.models = None  # of the formulation; different in the first passes
+        self.models = models  # those of the formulation
         self.neighbours: Neighbours | None = None
         self.dt = 0.0  # of the present step
+        self.is_start = False  # before the first step, where supports are guesses
 
     def run(self, function, models, *arguments) -> None:
         """Call function(first, last, dim, models, neighbours, *arguments) over ranges of blocks."""

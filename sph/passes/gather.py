@@ -1,8 +1,8 @@
-"""Copying of candidates' values to scratch arrays, with images applied by the rank of the field.
+"""Copying of candidates' values to scratch arrays, with images applied by the field's rank.
 
-`sign` (K, D) and `offset` (K, D) are those of the images (`sph.domain`). A field or scratch that is
-None costs nothing. The loops run over len(dim), a constant to the compiler; over a shape they would
-not unroll.
+`sign` (K, D) and `offset` (K, D) describe the images (`sph.domain`). A field or scratch array that
+is None costs no time. The loops run over len(dim), which is a constant for the compiler; it would
+not unroll loops over the shape of an array.
 """
 
 from numba import njit, types

@@ -1,1 +1,1 @@
-"""Problems, one file each: its class `Problem` gives the keys, initial state and exact solution."""
+"""Problems, one file each: a class `Problem` with keys, initial state and exact solution."""

@@ -1,7 +1,7 @@
-"""Riemann problem: two gases at rest or in motion, separated by a diaphragm that bursts at t = 0.
+"""Riemann problem: two gases, separated by a diaphragm that bursts at t = 0.
 
-The default states are those of Sod (1978), J. Comput. Phys. 27, 1. The tube lies along x, in 1-D to
-3-D.
+Each gas is at rest or in uniform motion. The default states are those of Sod (1978), J. Comput.
+Phys. 27, 1. The tube lies along x, in 1-D to 3-D.
 """
 
 import math

@@ -1,4 +1,4 @@
-"""A Mach 3 shock that runs into a sine wave of density, which the shock compresses and amplifies.
+"""A Mach 3 shock that runs into sine waves of density, and amplifies them.
 
 Shu & Osher (1989), J. Comput. Phys. 83, 32, problem 8. There is no exact solution: errors are
 computed against a Lagrangian finite-volume solution. The sensitive feature is the train of short

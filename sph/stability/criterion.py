@@ -1,4 +1,4 @@
-"""When a run is stable: its status, errors, energy and limits, against a run with small steps."""
+"""When a run is stable: its errors, energy and limits, compared with small time steps."""
 
 from dataclasses import dataclass
 from pathlib import Path

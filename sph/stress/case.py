@@ -11,7 +11,6 @@ The file is a configuration, as `sph run` takes it, with further keys:
 """
 
 import fnmatch
-import tomllib
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -19,9 +18,10 @@ from typing import Any
 import tomli_w
 from pydantic import Field, ValidationError, model_validator
 
-from sph.config.errors import suggestion
+from sph.config import reading
+from sph.config.errors import Issue, as_error, explain, suggestion
 from sph.config.sections import SECTIONS
-from sph.errors import ConfigError, FileError
+from sph.errors import ConfigError
 from sph.problems.base import Section
 
 FOLDER = Path(__file__).parent / "cases"
@@ -122,11 +122,12 @@ class Case(Section):
         for name, setting in self.settings.items():
             limit = setting.fails and setting.fails.limit
             if limit and limit not in self.bounds(name):
-                raise ValueError(
-                    f"settings.{name} is expected to break {limit}, which has no limit"
-                )
+                valid = sorted(self.bounds(name))
+                text = f'= "{limit}" is not a figure with a limit; {suggestion(limit, valid)}'
+                raise as_error([Issue(("settings", name, "fails", "limit"), text)])
         if all(setting.fails for setting in self.settings.values()):
-            raise ValueError("no setting is expected to pass")
+            text = ": expected at least one setting without `fails`"
+            raise as_error([Issue(("settings",), text)])
         return self
 
     def bounds(self, setting: str) -> dict[str, Bound]:
@@ -139,13 +140,21 @@ class Case(Section):
 
 
 def read(path: Path) -> Case:
-    """The case in a file. Raises FileError where the file is not a valid case."""
+    """The case in a file. Raises FileError if it cannot be read, ConfigError if it is invalid."""
+    source = reading.parse(reading.read(path), str(path))
+    own = {key: value for key, value in source.tables.items() if key not in TABLES}
+    tables = {key: value for key, value in source.tables.items() if key in TABLES}
+    reserved = {"name": path.stem, "configuration": tables}
+    issues = [Issue((key,), "is not a key of a case") for key in own if key in reserved]
     try:
-        content = tomllib.loads(path.read_text(encoding="utf-8"))
-        tables = {name: content.pop(name) for name in TABLES if name in content}
-        return Case(name=path.stem, configuration=tables, **content)
-    except (OSError, tomllib.TOMLDecodeError, TypeError, ValidationError) as error:
-        raise FileError(f"{path} is not a case of the stress suite: {error}") from None
+        found = Case.model_validate(own | reserved)
+    except ValidationError as error:
+        details = error.errors(include_url=False)
+        wrong = explain(Case, own | reserved, details, "case", {})
+        issues += [issue._replace(path=issue.path[1:]) for issue in wrong]
+    if issues:
+        raise ConfigError("\n".join(map(source.report, sorted(issues, key=source.order))))
+    return found
 
 
 def names() -> list[str]:

@@ -1,4 +1,4 @@
-"""Run points on the workers of a Dask scheduler; workers see the same files under the same path.
+"""Run points on the workers of a Dask scheduler; all see the same files and paths.
 
 A worker runs each point in a process of its own, one process for each thread of the worker.
 """

@@ -168,8 +168,12 @@ def _refuse_change(what: str, there: Config | None, now: Config) -> None:
 
 def _differences(there: Config, now: Config) -> list[str]:
     before, after = (tomllib.loads(one.to_toml(include_run=False)) for one in (there, now))
+
+    def shown(table: dict, key: str) -> str:
+        return value_text(table[key]) if key in table else "not set"
+
     return [
-        f"{table}.{key} = {before[table].get(key)} there, {after[table].get(key)} now"
+        f"{table}.{key} = {shown(before[table], key)} there, {shown(after[table], key)} now"
         for table in before
         for key in before[table] | after[table]
         if before[table].get(key) != after[table].get(key)

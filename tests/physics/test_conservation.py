@@ -30,7 +30,7 @@ def uniform_config(*overrides, problem=None):
 
 @pytest.mark.parametrize("boundary", ["periodic", "open"])
 @pytest.mark.parametrize("dimension", [1, 2, 3])
-def test_momentum_is_kept(dimension, boundary):
+def test_momentum_random_gas_conserved_along_axes_without_walls(dimension, boundary):
     config = uniform_config(
         f"problem.dimension={dimension}", "problem.n=1000", "problem.noise=0.3",
         "problem.velocity=0.7", "time.end=1.0", f"problem.boundary={boundary}",
@@ -44,7 +44,7 @@ def test_momentum_is_kept(dimension, boundary):
     assert change <= 1e-12 * scale
 
 
-def test_energy_error_of_a_smooth_wave_falls_with_the_square_of_the_step():
+def test_energy_error_smooth_wave_falls_with_square_of_step():
     drift = []
     for C in (0.3, 0.15, 0.075):
         config = uniform_config(
@@ -60,7 +60,7 @@ def test_energy_error_of_a_smooth_wave_falls_with_the_square_of_the_step():
 
 
 @pytest.mark.parametrize("dimension", [1, 2, 3])
-def test_uniform_gas_at_rest_stays(dimension):
+def test_uniform_gas_at_rest_stays_at_rest(dimension):
     outcome = simulate(
         uniform_config(f"problem.dimension={dimension}", "problem.n=512", "problem.velocity=0.0"),
         10,
@@ -71,7 +71,7 @@ def test_uniform_gas_at_rest_stays(dimension):
     np.testing.assert_allclose(p.density, p.density.mean(), rtol=1e-10)
 
 
-def test_moving_gas_is_the_resting_one_in_motion():
+def test_uniform_gas_with_bulk_velocity_equals_gas_at_rest():
     at_rest = simulate(
         uniform_config("problem.noise=0.3", "problem.n=256", "problem.velocity=0.0"), 10
     )

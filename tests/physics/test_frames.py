@@ -18,7 +18,7 @@ def frames():
 
 
 @pytest.mark.parametrize("stem", ["shock_tube", "kelvin_helmholtz_smooth", "gresho", "yee"])
-def test_a_boost_changes_no_verdict(frames, capsys, stem):
+def test_verdict_with_bulk_velocity_unchanged(frames, capsys, stem):
     """From sound to unstable steps; `python scripts/frames.py` does it for all shipped scenes."""
     assert frames.verdicts(CONFIGS / f"{stem}.toml", steps=20) == 0
     assert len(capsys.readouterr().out.splitlines()) == len(frames.COURANT)

@@ -32,12 +32,12 @@ def growth(*overrides) -> float:
 
 
 @pytest.mark.parametrize("lattice", ["cubic", "hexagonal"])
-def test_lattices_of_the_default_kernel_come_apart(lattice):
+def test_lattice_with_default_kernel_is_unstable(lattice):
     # e^(.07 x 95) = 770 (square) and e^(.115 x 95) = 6e4 (hexagonal) for the fastest mode alone
     assert growth(f"problem.lattice={lattice}") > 30
 
 
-def test_the_lattice_of_the_shipped_wave_in_two_dimensions_stays():
+def test_lattice_of_shipped_2d_wave_is_stable():
     config = configuration.load(CONFIGS / "sound_wave_2d.toml")
     physics = (f"physics.kernel={config.physics.kernel}", f"physics.eta={config.physics.eta}")
     # what is left is the time integration's: e^(.0116 x 95) = 3 for the fastest mode alone

@@ -15,7 +15,7 @@ def order(numbers, errors) -> float:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("stem", SHIPPED)
-def test_shipped_configuration_keeps_the_limits_of_its_problem(run, stem):
+def test_shipped_configuration_keeps_limits_of_its_problem(run, stem):
     outcome = run(stem)
     figures = outcome.report() | {"energy_drift": outcome.energy_drift}
     limits: dict[str, base.Limit] = outcome.simulation.scene.config.problem.limits
@@ -31,7 +31,7 @@ def wave_reports(run, *overrides):
 
 
 @pytest.mark.parametrize("figure", ["error_velocity_relative", "error_density_relative"])
-def test_sound_wave_is_of_second_order_in_one_dimension(run, figure):
+def test_sound_wave_1d_without_viscosity_converges_at_second_order(run, figure):
     errors = [report[figure] for report in wave_reports(run)]
     # Smoothing by the kernel and leapfrog are of second order. Viscosity, of first, is turned off
     # by the softening of Balsara's factor, which at this amplitude is far above the divergence.
@@ -39,7 +39,7 @@ def test_sound_wave_is_of_second_order_in_one_dimension(run, figure):
     assert errors[-1] < 1e-3  # 0.00076 was measured
 
 
-def test_viscosity_makes_it_first_order(run):
+def test_sound_wave_1d_with_viscosity_converges_at_first_order(run):
     errors = [r["error_velocity_relative"] for r in wave_reports(run, "physics.balsara=false")]
     assert 0.8 < order(NUMBERS, errors) < 1.2
     damping = wave_reports(run, "physics.balsara=false")[-1]["wave_amplitude_error"]
@@ -48,7 +48,7 @@ def test_viscosity_makes_it_first_order(run):
 
 
 @pytest.mark.slow
-def test_waves_in_two_dimensions_meet_a_floor_that_only_eta_lowers(run):
+def test_sound_wave_2d_has_error_floor_that_falls_with_eta(run):
     def across(n_x, *overrides):
         keys = ("problem.dimension=2", f"problem.n={n_x * n_x // 8}", *overrides)
         return run("sound_wave", *keys).report()
@@ -61,7 +61,7 @@ def test_waves_in_two_dimensions_meet_a_floor_that_only_eta_lowers(run):
     assert abs(wider["phase_speed_error"]) < 0.5 * fine["phase_speed_error"]
 
 
-def test_steepened_wave_is_the_exact_one(run):
+def test_steepened_wave_matches_exact_solution(run):
     outcome = run("sound_wave", "problem.n=512", "problem.amplitude=0.1")
     report = outcome.report()
     # crests are 13 % faster than sound; a wave that kept its shape would be wrong by some 0.27
@@ -74,7 +74,7 @@ DEFAULTS = ("physics.kernel=wendland_c2", "physics.eta=1.6", "physics.alpha=1.0"
 
 
 @pytest.mark.slow
-def test_settings_for_vortices_beat_the_defaults(run):
+def test_vortex_shipped_settings_beat_defaults(run):
     good, plain = run("gresho").report(), run("gresho", *DEFAULTS).report()
     # 0.0263 and 0.0733 were measured
     assert good["error_v_phi"] < 0.031 < 0.06 < plain["error_v_phi"] < 0.09
@@ -82,7 +82,7 @@ def test_settings_for_vortices_beat_the_defaults(run):
 
 
 @pytest.mark.slow
-def test_bulk_motion_adds_no_error(run):
+def test_vortex_with_bulk_velocity_has_no_larger_error(run):
     at_rest = run("gresho", "problem.n=1024").report()
     moving = run("gresho", "problem.n=1024", "problem.velocity=[1.0, 0.5]").report()
     # the scheme is Galilean invariant: differences are round-off, amplified by the flow's chaos
@@ -100,7 +100,7 @@ def test_smooth_vortex_converges(run):
 # --- implosion --------------------------------------------------------------------------------
 
 
-def test_planar_implosion_is_that_of_an_independent_transcription(run):
+def test_planar_implosion_matches_independent_code(run):
     outcome = run("noh")
     report = outcome.report()
     # half a unit of the last digit it gives
@@ -111,7 +111,7 @@ def test_planar_implosion_is_that_of_an_independent_transcription(run):
     assert report["shock_radius"] == pytest.approx(0.2, abs=0.005)  # two spacings of 0.01/4
 
 
-def test_mirror_is_as_good_as_the_other_half(run):
+def test_implosion_with_mirror_matches_whole_domain(run):
     half = run("noh").report()
     whole = run("noh", "problem.n=200", "problem.domain=[-1.0, 1.0]", "problem.boundary='open'")
     report = whole.report()
@@ -123,7 +123,7 @@ def test_mirror_is_as_good_as_the_other_half(run):
     assert np.abs(p.position).max() == pytest.approx(0.4, abs=0.01)
 
 
-def test_cylindrical_plateau(run):
+def test_cylindrical_implosion_plateau_within_measured_error(run):
     keys = ("problem.n=1257", "problem.domain=[0.0, 1.0]", "problem.boundary='mirror'")
     report = run("noh_2d", *keys).report()
     assert report["plateau_density_exact"] == pytest.approx(16.0)
@@ -136,7 +136,7 @@ def test_cylindrical_plateau(run):
 # --- contact ----------------------------------------------------------------------------------
 
 
-def test_surface_tension_of_the_seeds_scheme_rounds_a_square(run):
+def test_square_with_shipped_scheme_becomes_round(run):
     start = run("square", "problem.n=448", max_steps=0).report()
     assert start == {"squareness": 1.0, "dense_outside": 0.0}
     report = run("square", "problem.n=448", "time.end=4.0").report()
@@ -147,7 +147,7 @@ def test_surface_tension_of_the_seeds_scheme_rounds_a_square(run):
 
 
 @pytest.mark.slow
-def test_waves_of_density_behind_a_shock(run):
+def test_density_waves_behind_shock_within_measured_error(run):
     report = run("shu_osher", "problem.n=800").report()
     # Mach 3 into a mean density of 1: -4 + 1.8 x 3 x 1.18322 = 2.389, bent by the waves to 2.396
     assert report["shock_position"] == pytest.approx(2.396, abs=0.02)

@@ -26,7 +26,7 @@ def load(stem, *overrides):
     + [f"conductivity='{name}'" for name in CONDUCTIVITIES]
     + [f"conductivity={{name='{name}', switched=true}}" for name in CONDUCTIVITIES],
 )
-def test_all_keep_energy_and_find_the_tube(override):
+def test_every_scheme_conserves_energy_and_solves_sod(override):
     outcome = simulate(load("sod", "problem.n=100", f"physics.{override}"))
     # the pairs' exchanges cancel to round-off; the leapfrog loses some 1e-5 at C = 0.15
     assert outcome.energy_drift < 1e-4
@@ -48,7 +48,7 @@ def entropy_error(scheme, C):
     return np.abs(after / before - 1).max()
 
 
-def test_variational_scheme_keeps_entropy():
+def test_variational_scheme_conserves_entropy():
     grad_h, variational = (
         [entropy_error(scheme, C) for C in (0.04, 0.02)] for scheme in ("grad_h", "variational")
     )
@@ -59,7 +59,7 @@ def test_variational_scheme_keeps_entropy():
     assert variational[1] < grad_h[1] / 30
 
 
-def test_switched_conductivity_smooths_the_contact_and_spares_the_rest():
+def test_switched_conductivity_smooths_contact_only():
     def tube(*overrides):
         outcome = simulate(load("sod", "problem.n=200", *overrides))
         return outcome.l1("density"), outcome.particles.internal_energy.max()
@@ -72,7 +72,7 @@ def test_switched_conductivity_smooths_the_contact_and_spares_the_rest():
     assert switched[0] - none[0] < (fixed[0] - none[0]) / 3
 
 
-def test_pressure_energy_leaves_a_contact_at_rest():
+def test_pressure_energy_scheme_keeps_contact_at_rest():
     grad_h, pressure_energy = (
         simulate(load("square", "problem.n=448", "time.end=1.0", f"physics.scheme='{scheme}'"))
         for scheme in ("grad_h", "pressure_energy")
@@ -86,7 +86,7 @@ def test_pressure_energy_leaves_a_contact_at_rest():
     assert pressure_energy.energy_drift < 1e-5  # gas nearly at rest: 4e-6 seen
 
 
-def test_pressure_is_even_across_a_contact_only_where_it_is_summed():
+def test_pressure_across_contact_even_only_with_pressure_energy():
     def unevenness(scheme):
         outcome = simulate(load("square", "problem.n=448", f"physics.scheme='{scheme}'"), 0)
         p = outcome.particles
@@ -107,7 +107,7 @@ def resumed(run, scheme, clock):
     )
 
 
-def test_a_run_goes_on_bit_for_bit_and_under_another_scheme():
+def test_restart_same_scheme_bit_for_bit_and_other_scheme_accepted():
     config = load("square", "problem.n=112", "physics.scheme='pressure_energy'")
     clock = Clock()
     run = Simulation.start(Scene(config), 1, clock)

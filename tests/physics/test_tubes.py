@@ -12,7 +12,7 @@ SOD_400 = {"density": 0.0052, "velocity": 0.0155, "pressure": 0.0060}
 
 
 @pytest.mark.parametrize("field", SOD_400)
-def test_error_of_sod(run, field):
+def test_sod_error_within_limit(run, field):
     assert run("sod").l1(field) <= SOD_400[field]
 
 
@@ -26,7 +26,7 @@ def test_sod_converges_with_the_number_of_particles(run):
 
 
 @pytest.mark.parametrize("stem", ["shock_tube", "strong_shock"])
-def test_plateaus_of_the_seeds_tubes(run, stem):
+def test_tube_plateaus_match_exact_star_states(run, stem):
     plateaus = {name: x for name, x in run(stem).report().items() if name.startswith("plateau")}
     assert len(plateaus) == 6
     for name, deviation in plateaus.items():
@@ -35,7 +35,7 @@ def test_plateaus_of_the_seeds_tubes(run, stem):
         assert abs(deviation) < 0.02, name
 
 
-def test_density_peak_of_the_strong_shock(run):
+def test_strong_shock_density_peak_matches_published(run):
     # The scheme heats the contact too little and overshoots there: the published data of the
     # test and an independent transcription both give 6.30 where 6.00 is exact.
     assert run("strong_shock").report()["peak_density"] == pytest.approx(6.30, abs=0.03)
@@ -44,12 +44,12 @@ def test_density_peak_of_the_strong_shock(run):
 @pytest.mark.parametrize(
     ("stem", "bound"), [("sod", 1e-4), ("shock_tube", 1e-4), ("strong_shock", 1e-4)]
 )
-def test_energy_of_the_tubes(run, stem, bound):
+def test_tube_energy_drift_within_bound(run, stem, bound):
     # the transcription drifts by 1.0e-5 at C = 0.15; ten times that is still far below the error
     assert run(stem).energy_drift < bound
 
 
-def test_courant_number_near_the_limit_of_stability_shows_in_the_energy(run, monkeypatch):
+def test_courant_number_near_stability_limit_raises_energy_drift(run, monkeypatch):
     # The transcription's figures for 200 particles: 6.6e-3 at C = 0.3, 1.0e-5 at 0.15, 5.2e-6 at
     # 0.075. They agree to the digits given, so the step and its criteria are the same; 0.3 is more
     # than alpha = 2 bears, and is held at 0.207 here, which the transcription does not know.
@@ -67,7 +67,7 @@ def test_courant_number_near_the_limit_of_stability_shows_in_the_energy(run, mon
 
 
 @pytest.mark.slow
-def test_three_dimensional_tube_is_the_one_dimensional_one(run):
+def test_tube_3d_matches_tube_1d(run):
     """A coarse 3-D Sod tube, for its shape; the full one is in scripts/."""
     outcome = run("sod_3d", "problem.n=12348")  # half the cells along each axis
     # First order from the fine run's .0194: twice that, and 15 % for the coarse right side.
@@ -78,7 +78,7 @@ def test_three_dimensional_tube_is_the_one_dimensional_one(run):
     assert across < 0.2
 
 
-def test_shock_into_a_stiff_liquid(run):
+def test_shock_into_stiffened_gas_matches_exact_solution(run):
     outcome = run("stiffened_tube", "problem.n=400")
     plateaus = {n: x for n, x in outcome.report().items() if n.startswith("plateau")}
     # 0.0005 at most was measured with 400 and with 1000 particles, 0.026 in pressure with the

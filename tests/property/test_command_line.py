@@ -36,7 +36,7 @@ texts = some.one_of(
 
 
 @pytest.fixture(autouse=True)
-def nothing_runs(monkeypatch, tmp_path_factory):
+def without_runs(monkeypatch, tmp_path_factory):
     """In a directory of its own, with points and runs left out."""
     directory = tmp_path_factory.mktemp("fuzzed")
     (directory / "tube.toml").write_text(TUBE)
@@ -61,7 +61,7 @@ def checked(*arguments):
 @example(["physics.C=1:9000:+1", "physics.alpha=1:9000:+1"], [])
 @example(["physics.kernel=\udcff,\x00"], [])
 @example(["problem.dimension=1.0"], [])
-def test_texts_of_vary(varied, given_texts):
+def test_any_vary_text_accepted_or_clean_error(varied, given_texts):
     target = f"sweep-{len(os.listdir())}"
     options = [part for text in varied for part in ("--vary", text)]
     options += [part for text in given_texts for part in ("--set", text)]
@@ -71,6 +71,6 @@ def test_texts_of_vary(varied, given_texts):
 @given(some.lists(texts, min_size=1, max_size=3))
 @example(['report.reference="a\\u0000b"'])
 @example(["report.reference=\udcff"])
-def test_texts_of_set(given_texts):
+def test_any_set_text_accepted_or_clean_error(given_texts):
     options = [part for text in given_texts for part in ("--set", text)]
     checked("run", "tube.toml", *options, "--force")

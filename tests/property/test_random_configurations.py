@@ -70,7 +70,7 @@ def configurations(draw):
 
 
 @given(tables=configurations())
-def test_random_configurations(tables):
+def test_random_tables_read_back_equal_or_refused(tables):
     try:
         text = tomli_w.dumps(tables)
     except (TypeError, ValueError):  # what TOML has no form for
@@ -103,7 +103,7 @@ def test_random_configurations(tables):
 
 
 @given(text=st.text(max_size=60))
-def test_any_text(text):
+def test_any_text_accepted_or_refused_with_file_name(text):
     try:
         configuration.from_text(f'[problem]\nname = "uniform"\n{text}', "some.toml")
     except ConfigError as error:
@@ -112,7 +112,7 @@ def test_any_text(text):
 
 
 @given(override=st.text(max_size=30), value=values)
-def test_any_override(override, value):
+def test_any_override_accepted_or_refused_with_source(override, value):
     config = configuration.from_text('[problem]\nname = "uniform"\n')
     for text in (override, f"problem.domain={value}", f"physics.{override}={value}"):
         try:
@@ -122,6 +122,6 @@ def test_any_override(override, value):
 
 
 @pytest.mark.parametrize("problem", PROBLEMS)
-def test_defaults_are_taken(problem):
+def test_default_configuration_reads_back_equal(problem):
     config = configuration.from_text(f'[problem]\nname = "{problem}"\n')
     assert configuration.from_text(config.to_toml()) == config

@@ -42,7 +42,7 @@ SCENES = {
 }
 
 
-class Given(uniform.Problem):
+class GivenParticles(uniform.Problem):
     """Whatever particles a test puts in."""
 
     def initial(self, eos):
@@ -62,7 +62,7 @@ def simulation(state: InitialState, dimension, boundary, scene, **physics):
     settings = config.physics.model_dump() | SCENES[scene] | physics
     config = dataclasses.replace(
         config,
-        problem=Given(**config.problem.model_dump()),
+        problem=GivenParticles(**config.problem.model_dump()),
         physics=type(config.physics)(**settings),
     )
     GIVEN[:] = [state]
@@ -156,7 +156,9 @@ signs = st.sampled_from([-1.0, 1.0])
     equal_masses=st.booleans(),
     boundary=st.sampled_from(["periodic", "mirror", "open"]),
 )
-def test_riemann_states(scene, densities, pressures, mach, direction, equal_masses, boundary):
+def test_random_riemann_states_conserve_or_fail_cleanly(
+    scene, densities, pressures, mach, direction, equal_masses, boundary
+):
     rho, P = 10.0 ** np.array(densities), 10.0 ** np.array(pressures)
     v = np.array(direction) * np.array(mach) * np.sqrt(1.4 * P / rho)
     if equal_masses:
@@ -184,7 +186,9 @@ def test_riemann_states(scene, densities, pressures, mach, direction, equal_mass
     clump=st.floats(0.05, 1.0),
     cold=st.sampled_from([0.0, 0.0, 0.5, 1.0]),
 )
-def test_random_particles(scene, seed, dimension, boundary, spread, mach, clump, cold):
+def test_random_particles_conserve_or_fail_cleanly(
+    scene, seed, dimension, boundary, spread, mach, clump, cold
+):
     """Scattered, some crowded, masses and energies over `spread` decades, a part without energy."""
     random = np.random.default_rng(seed)
     n = 40 if dimension == 1 else 120

@@ -39,7 +39,7 @@ def start_rates(scene, gas):
 
 @pytest.mark.parametrize("dimension", DIMENSIONS)
 @pytest.mark.parametrize("kernel", dense.KERNELS)
-def test_kernel_is_normalised_and_its_slope_and_width_belong_to_it(kernel, dimension):
+def test_kernel_normalisation_slope_and_width_consistent(kernel, dimension):
     # exact: at most degree 15 on each sixth, which holds the knots of every spline
     nodes, weights = np.polynomial.legendre.leggauss(8)
     q = ((np.arange(6)[:, None] + 0.5 + 0.5 * nodes) / 6).ravel()
@@ -95,7 +95,7 @@ def smoothed_pressure_work(scene, gas, weight):
 @pytest.mark.parametrize("density", DENSITIES)
 @pytest.mark.parametrize("scheme", ["variational", "pressure_energy"])
 @pytest.mark.parametrize("dimension", DIMENSIONS)
-def test_force_is_the_gradient_of_the_energy(dimension, scheme, density):
+def test_force_equals_gradient_of_energy(dimension, scheme, density):
     """With all terms of the supports' change, which the constraint of eqs 7 and 15 rules."""
     position, velocity, mass, energy = gas_for(density, dimension)
     scene = unit_box(dimension, "periodic", alpha=0.0, scheme=scheme, eta=1.2, density=density)
@@ -119,7 +119,7 @@ def test_force_is_the_gradient_of_the_energy(dimension, scheme, density):
 
 @pytest.mark.parametrize("density", DENSITIES)
 @pytest.mark.parametrize("dimension", DIMENSIONS)
-def test_pressure_energy_is_variational_where_energy_is_uniform(dimension, density):
+def test_pressure_energy_uniform_energy_equals_variational(dimension, density):
     """Energy per particle, that is, where density is by number."""
     position, velocity, mass, _ = gas_for(density, dimension)
     per = np.ones_like(mass) if density == "mass" else mass
@@ -135,7 +135,7 @@ def test_pressure_energy_is_variational_where_energy_is_uniform(dimension, densi
 
 
 @pytest.mark.parametrize(("name", "speed"), [("approach", 2.0), ("pressure_jump", None)])
-def test_conduction_of_two_particles_by_hand(name, speed):
+def test_conduction_two_particles_matches_by_hand(name, speed):
     """Of one density, closing at 2: m_j/rho strength speed (u_i - u_j) dW/dr."""
     gas = np.array([[0.0, 0.5]]), np.array([[1.0, -1.0]]), np.ones(2), np.array([2.5, 1.0])
     plain = dense.Scene(np.array([[0.0, 1.0]]), ("open",), density_passes=1, unsettled=np.inf)
@@ -158,7 +158,7 @@ def test_conduction_of_two_particles_by_hand(name, speed):
 
 
 @pytest.mark.parametrize("flattened", [False, True])
-def test_flattened_gradient_touches_the_forces_alone(flattened):
+def test_flattened_gradient_changes_forces_only(flattened):
     gas = random_gas(2)
     plain = start_rates(unit_box(2, "open", kernel="cubic_spline"), gas)
     found = start_rates(unit_box(2, "open", kernel="cubic_spline", flattened=flattened), gas)
@@ -168,7 +168,7 @@ def test_flattened_gradient_touches_the_forces_alone(flattened):
     assert np.any(found.acceleration_scale > plain.acceleration_scale) == flattened
 
 
-def test_density_of_a_uniform_line_is_the_known_floor():
+def test_density_uniform_line_has_known_error_floor():
     count = 50
     position = (np.arange(count) + 0.5)[None] / count
     gas = position, np.zeros((1, count)), np.full(count, 1 / count), np.ones(count)
@@ -179,7 +179,7 @@ def test_density_of_a_uniform_line_is_the_known_floor():
 
 @pytest.mark.parametrize("scheme", SCHEMES)
 @pytest.mark.parametrize("dimension", DIMENSIONS)
-def test_density_by_number_is_that_by_mass_at_equal_masses(dimension, scheme):
+def test_density_by_number_equal_masses_equals_density_by_mass(dimension, scheme):
     position, velocity, _, energy = random_gas(dimension)
     gas = position, velocity, np.full(len(energy), 0.7), energy
     by_mass, found = (
@@ -192,7 +192,7 @@ def test_density_by_number_is_that_by_mass_at_equal_masses(dimension, scheme):
         assert np.all(off <= 1e-12 * getattr(by_mass, name + "_scale")), name
 
 
-def test_density_by_number_does_not_see_a_neighbours_mass():
+def test_density_by_number_independent_of_neighbour_masses():
     """A line of one spacing whose mass jumps by 1000 : 1: rho is m over the spacing everywhere."""
     count = 80
     position = (np.arange(count) + 0.5)[None] / count
@@ -208,7 +208,7 @@ def test_density_by_number_does_not_see_a_neighbours_mass():
 
 @pytest.mark.parametrize("dimension", DIMENSIONS)
 @pytest.mark.parametrize("kernel", KERNELS)
-def test_omega_is_the_slope_of_density_in_support(kernel, dimension):
+def test_omega_equals_slope_of_density_in_support(kernel, dimension):
     gas = random_gas(dimension)
     scene = unit_box(dimension, "open", kernel=kernel, density_passes=1, unsettled=np.inf)
     support, step = np.linspace(0.2, 0.6, len(gas[2])), 1e-5
@@ -221,7 +221,7 @@ def test_omega_is_the_slope_of_density_in_support(kernel, dimension):
 
 
 @pytest.mark.parametrize("dimension", DIMENSIONS)
-def test_converged_support_solves_its_equation_and_passes_approach_it(dimension):
+def test_converged_support_solves_equation_and_passes_approach_solution(dimension):
     gas = random_gas(dimension)
     scene = unit_box(dimension, "periodic", eta=1.2, density_passes="converged")
     solved = dense.rates(scene, *gas, np.full(len(gas[2]), 0.1))
@@ -261,7 +261,7 @@ def test_uniform_expansion_is_exact(kernel, dimension):
     np.testing.assert_allclose(inward.alpha_rate, dimension * 1.9, rtol=1e-11)  # eq 28
 
 
-def test_alpha_decays_over_its_own_length():
+def test_alpha_without_compression_decays_over_its_length():
     """Eq 27 with h, not H, at rest: the rate is -(alpha - min) c / (4 h)."""
     position, velocity, mass, energy = random_gas(2)
     scene = unit_box(2, "periodic", alpha={"min": 0.1, "max": 2.0})
@@ -273,7 +273,7 @@ def test_alpha_decays_over_its_own_length():
 
 
 @pytest.mark.parametrize("dimension", [2, pytest.param(3, marks=pytest.mark.slow)])
-def test_rotation_has_curl_two_and_no_divergence(dimension):
+def test_rigid_rotation_has_curl_two_and_no_divergence(dimension):
     """Exact about the centre of a cubic lattice, for the reason of the expansion."""
     axis = np.linspace(-1, 1, {2: 21, 3: 11}[dimension])
     position = np.array(np.meshgrid(*[axis] * dimension)).reshape(dimension, -1)
@@ -296,7 +296,7 @@ def test_rotation_has_curl_two_and_no_divergence(dimension):
 
 
 @pytest.mark.parametrize("balsara", [False, True])
-def test_two_particles_by_hand(balsara):
+def test_rates_two_particles_match_by_hand(balsara):
     """Alike and closing at relative speed 2: eqs 19-26 and 32 in closed form."""
     scene = dense.Scene(
         np.array([[0.0, 1.0]]), ("open",), alpha=2.0, balsara=balsara, density_passes=1,
@@ -338,7 +338,7 @@ def test_two_particles_by_hand(balsara):
 
 
 @pytest.mark.parametrize("dimension", [1, 2])
-def test_mirror_is_half_of_a_doubled_periodic_box(dimension):
+def test_mirror_box_equals_half_of_doubled_periodic_box(dimension):
     position, velocity, mass, energy = random_gas(dimension)
     walls = unit_box(dimension, "mirror", alpha={"min": 0.5, "max": 2.0})
     found = start_rates(walls, (position, velocity, mass, energy))
@@ -361,7 +361,7 @@ def test_mirror_is_half_of_a_doubled_periodic_box(dimension):
     np.testing.assert_allclose(found.signal_speed, whole.signal_speed[:count], rtol=1e-12)
 
 
-def test_one_step_is_equations_1_to_6_and_29_to_31():
+def test_one_step_equals_equations_1_to_6_and_29_to_31():
     scene = unit_box(1, "open", alpha={"min": 0.5, "max": 2.0})
     first = dense.start(scene, *random_gas(1))
     dt = 0.7 * first.dt
@@ -394,7 +394,7 @@ def shock_tube(count):
     return scene, (position, np.zeros((1, count)), np.full(count, spacing), energy)
 
 
-def test_shock_tube_conserves_and_flows_from_high_to_low_pressure():
+def test_shock_tube_conserves_and_flows_to_low_pressure():
     scene, gas = shock_tube(200)
     final = dense.integrate(scene, dense.start(scene, *gas), 0.04, outputs=(0.01, 0.025))
     energy = np.array([moment.kinetic + moment.internal for moment in final.history])
@@ -414,7 +414,7 @@ def test_shock_tube_conserves_and_flows_from_high_to_low_pressure():
 
 
 @pytest.mark.parametrize("boundary", ["mirror", "periodic"])
-def test_a_particle_crosses_the_face_as_its_image(boundary):
+def test_particle_crossing_periodic_face_reenters(boundary):
     """The line of gas drifts through the face: nothing but the wall's push may turn it."""
     count = 20
     position = (np.arange(count) + 0.5)[None] / count
@@ -432,7 +432,7 @@ def test_a_particle_crosses_the_face_as_its_image(boundary):
         assert final.velocity[0, -1] < 0
 
 
-def test_what_cannot_be_computed_is_refused():
+def test_unsolvable_state_is_refused():
     gas = random_gas(1)
     with pytest.raises(ValueError, match="no solution"):
         dense.start(unit_box(1, "open"), *(array[..., :1] for array in gas))

@@ -46,7 +46,7 @@ def contact(domain, position, moves, support, identity, reached):
 
 @pytest.mark.parametrize("boundaries", BOUNDARIES)
 @pytest.mark.parametrize("fast", [0.05, 0.3])  # the part of particles that are
-def test_the_first_contact_is_that_of_all_pairs(boundaries, fast):
+def test_first_contact_equals_minimum_over_all_pairs(boundaries, fast):
     """Two clouds far apart in one axis, as wholes on their way, with particles ahead of them."""
     dimension = len(boundaries)
     domain = Domain(np.tile([0.0, 1.0], (dimension, 1)), boundaries)
@@ -78,7 +78,7 @@ def test_the_first_contact_is_that_of_all_pairs(boundaries, fast):
     assert met > 20  # else this shows little
 
 
-def test_a_step_across_the_box_is_cut_to_what_images_serve():
+def test_step_across_box_limited_to_reach_of_images():
     domain = Domain(np.array([[0.0, 1.0]]), ("periodic",))
     two = np.array([[0.0, 0.5]]), np.array([[3.0, -1.0]]), np.zeros((1, 2)), np.full(2, 1e-3)
     bound = first_contact(
@@ -97,7 +97,7 @@ def test_a_step_across_the_box_is_cut_to_what_images_serve():
 # --- in runs ----------------------------------------------------------------------------------
 
 
-class Placed(uniform.Problem):
+class GivenParticles(uniform.Problem):
     """Gas where a test puts it."""
 
     places: list
@@ -126,7 +126,7 @@ def scene_of(places, speeds, energy, boundary="open", **physics):
         "energies": np.full(n, energy).tolist(),
     }
     physics = type(config.physics)(**(config.physics.model_dump() | physics))
-    return Scene(dataclasses.replace(config, problem=Placed(**settings), physics=physics))
+    return Scene(dataclasses.replace(config, problem=GivenParticles(**settings), physics=physics))
 
 
 @pytest.fixture
@@ -175,7 +175,7 @@ def unbounded(monkeypatch):
 
 @pytest.mark.parametrize("energy", [0.1, 1e-8])
 @pytest.mark.parametrize(("dimension", "side"), [(1, 50), (2, 22)])
-def test_cold_clouds_that_meet_keep_their_energy(begin, monkeypatch, dimension, side, energy):
+def test_cold_clouds_colliding_conserve_energy(begin, monkeypatch, dimension, side, energy):
     scene = scene_of(*meeting(dimension, side), energy, max_energy_drift=1e9)
     # the drift is that of the collision that follows: 4e-4 was the most, of 1-D at 0.1
     bounded = begin(scene)
@@ -187,7 +187,7 @@ def test_cold_clouds_that_meet_keep_their_energy(begin, monkeypatch, dimension, 
 
 
 @pytest.mark.parametrize("boundary", ["mirror", "periodic"])
-def test_a_cloud_meets_its_image(begin, monkeypatch, boundary):
+def test_cloud_colliding_with_its_image_conserves_energy(begin, monkeypatch, boundary):
     """A cloud flies at a wall; two halves of one at a periodic face."""
     place = cloud(1, 40)
     speed = np.full_like(place, 2.0)
@@ -202,7 +202,7 @@ def test_a_cloud_meets_its_image(begin, monkeypatch, boundary):
     assert drift(begin(scene), 0.3) > 0.02
 
 
-def test_a_few_fast_particles_into_gas(begin, monkeypatch):
+def test_fast_particles_into_gas_conserve_energy(begin, monkeypatch):
     gas = cloud(2, 12)
     bullet = np.array([[-0.50, -0.48, -0.50, -0.48], [0.24, 0.24, 0.26, 0.26]])
     speed = np.zeros((2, 148))
@@ -222,7 +222,7 @@ def test_a_few_fast_particles_into_gas(begin, monkeypatch):
     assert fastest(through) > 49.0
 
 
-def test_gas_that_parts_or_is_near_is_left_alone(begin):
+def test_separating_or_resting_clouds_do_not_limit_step(begin):
     place, speed = meeting(1, 50)
     parting = begin(scene_of(place, -speed, 1e-8))
     assert parting.limit.criterion != "approach"
@@ -230,7 +230,7 @@ def test_gas_that_parts_or_is_near_is_left_alone(begin):
     assert resting.limit.criterion != "approach"
 
 
-def test_a_restart_with_that_bound_goes_on_bit_for_bit(begin):
+def test_restart_with_contact_bound_is_bit_for_bit(begin):
     scene = scene_of(*meeting(2, 8), 1e-6)
     first = begin(scene)
     assert first.limit.criterion == "approach"

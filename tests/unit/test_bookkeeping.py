@@ -99,7 +99,7 @@ def recorded(one):
     }
 
 
-def test_a_row_of_the_history_has_each_sum_in_its_column(session, simulation):
+def test_history_row_has_each_sum_in_its_column(session, simulation):
     assert recorded(session()) == OF_EVERY_RUN
     assert simulation.clock.phases == ["diagnostics"]
 
@@ -129,7 +129,7 @@ def counted(simulation, *overrides):
 
 
 @pytest.mark.parametrize("column", OF_SOME_RUNS)
-def test_columns_of_some_scenes_are_there_where_they_mean_something(session, simulation, column):
+def test_optional_columns_present_only_where_meaningful(session, simulation, column):
     setting, expected = OF_SOME_RUNS[column]
     assert counted(simulation) == ()
     assert simulation.columns() == {}
@@ -138,7 +138,7 @@ def test_columns_of_some_scenes_are_there_where_they_mean_something(session, sim
     assert recorded(session(extra=[column])) == OF_EVERY_RUN | {column: expected}
 
 
-def test_a_part_may_have_columns_of_its_own(session, simulation):
+def test_columns_of_part_are_recorded(session, simulation):
     class Turning(Part):
         columns = ("turning_energy", "turns")
 
@@ -156,7 +156,7 @@ def test_a_part_may_have_columns_of_its_own(session, simulation):
     assert recorded(session(extra=[*expected])) == OF_EVERY_RUN | expected | {"total_energy": 4.5}
 
 
-def test_seconds_of_earlier_sessions_are_taken_from_the_last_row(session, simulation):
+def test_restart_seconds_continue_from_last_row(session, simulation):
     past = [
         {"wall_seconds": 1.0, "cpu_seconds": 1.5},
         {"wall_seconds": 4.0, "cpu_seconds": 6.0, "energy_injected": 0.75},
@@ -189,7 +189,7 @@ def place(tmp_path):
     return made
 
 
-def test_a_checkpoint_without_a_budget_takes_that_of_its_row(place):
+def test_checkpoint_without_budget_takes_it_from_history(place):
     """What it injected and added is of the checkpoint's step, its baseline of the first row."""
     directory = place(
         {"step": 0, "energy_injected": 0.5, "energy_added": 0.25,
@@ -203,13 +203,13 @@ def test_a_checkpoint_without_a_budget_takes_that_of_its_row(place):
     assert restarting._budget(SimpleNamespace(budget=kept, step=5), directory) is kept
 
 
-def test_a_checkpoint_without_a_budget_and_without_a_history_has_none(place, tmp_path):
+def test_checkpoint_without_budget_and_history_has_none(place, tmp_path):
     lone = SimpleNamespace(budget=None, step=5)
     assert restarting._budget(lone, RunDirectory(tmp_path)) is None
     assert restarting._budget(lone, place(extra=())) is None
 
 
-def test_a_lone_checkpoint_begins_its_history(session, simulation):
+def test_checkpoint_without_run_starts_new_history(session, simulation):
     one = session()
     one._closing = contextmanager(lambda: (yield))
     one._to_end = lambda: "ended"
@@ -219,7 +219,7 @@ def test_a_lone_checkpoint_begins_its_history(session, simulation):
     assert simulation.energy_injected == 13.0
 
 
-def test_a_session_closes_its_history_progress_and_threads_however_it_ends(session, simulation):
+def test_session_end_closes_history_progress_and_threads(session, simulation):
     one, closed = session(), []
     for name, thing in (("history", one.history), ("progress", one.progress),
                         ("simulation", simulation)):  # fmt: skip
@@ -229,7 +229,7 @@ def test_a_session_closes_its_history_progress_and_threads_however_it_ends(sessi
     assert closed == ["history", "progress", "simulation"]
 
 
-def test_a_checkpoint_is_written_after_the_rows_up_to_it(session, simulation, monkeypatch):
+def test_checkpoint_written_after_its_history_rows(session, simulation, monkeypatch):
     one, written = session(), []
     monkeypatch.setattr(
         runner.checkpoints,
@@ -273,7 +273,7 @@ def closing(session, monkeypatch):
     return one
 
 
-def test_a_summary_is_of_all_rows_with_the_status_reason_and_lineage(closing):
+def test_summary_covers_all_rows_with_status_reason_and_lineage(closing):
     closing._close("failed", "it broke")
     given = {"status": "failed", "reason": "it broke", "lineage": ("one line",), "rows": 1}
     assert closing.told == [("summary", given)]
@@ -281,7 +281,7 @@ def test_a_summary_is_of_all_rows_with_the_status_reason_and_lineage(closing):
 
 
 @pytest.mark.parametrize("status", ["done", "stopped", "failed"])
-def test_errors_against_a_reference_are_taken_at_the_end_and_judged_then(closing, status):
+def test_errors_against_reference_computed_at_end_of_run(closing, status):
     closing.config = CONFIG.override(["report.reference=fine"])
     result = closing._close(status)
     if status != "done":
@@ -298,7 +298,7 @@ def test_errors_against_a_reference_are_taken_at_the_end_and_judged_then(closing
 
 
 @pytest.mark.parametrize(("saved_step", "number"), [(20, 3), (19, 4), (None, 4)])
-def test_a_stop_writes_a_checkpoint_unless_there_is_one_and_names_the_last(
+def test_stop_writes_missing_checkpoint_and_names_last(
     closing, simulation, monkeypatch, saved_step, number
 ):
     written = []
@@ -315,7 +315,7 @@ def test_a_stop_writes_a_checkpoint_unless_there_is_one_and_names_the_last(
     assert closing.told[0][1]["status"] == "stopped"
 
 
-def test_a_run_shows_each_step_from_where_it_begins_to_its_end(closing, simulation, monkeypatch):
+def test_progress_shows_each_step_of_session(closing, simulation, monkeypatch):
     shown = []
     closing.config = CONFIG.override(["time.end=0.5", "output.interval=0.125"])
     simulation.scene.step_bounds = SimpleNamespace(courant=CONFIG.physics.C)
@@ -336,9 +336,7 @@ def test_a_run_shows_each_step_from_where_it_begins_to_its_end(closing, simulati
     assert closing.saved_step == 24
 
 
-def test_a_session_hears_nothing_from_numpy_and_says_where_threads_are_too_many(
-    tmp_path, monkeypatch
-):
+def test_session_silences_numpy_and_notes_too_many_threads(tmp_path, monkeypatch):
     monkeypatch.setattr(runner, "available_processors", lambda: 7)
     notes = []
     progress = SimpleNamespace(note=notes.append)
@@ -359,7 +357,7 @@ def test_a_session_hears_nothing_from_numpy_and_says_where_threads_are_too_many(
 # --- what it cost -----------------------------------------------------------------------------
 
 
-def test_cost_is_of_this_session_beside_the_seconds_of_all(simulation):
+def test_cost_reports_session_and_total_seconds(simulation):
     history = {"cpu_seconds": np.array([1.0, 8.0]), "wall_seconds": np.array([2.0, 9.0])}
     found = summary.cost(simulation, history)
     assert found["session"].pop("peak_memory_bytes") > 1e6
@@ -382,6 +380,6 @@ def test_cost_is_of_this_session_beside_the_seconds_of_all(simulation):
     assert summary.cost(simulation, history)["session"]["updates_per_cpu_second"] is None
 
 
-def test_memory_is_in_bytes():
+def test_peak_memory_is_in_bytes():
     # of Python with NumPy: between 20 MB and 20 GB
     assert 2e7 < summary.peak_memory() < 2e10

@@ -83,14 +83,23 @@ def hashes(run):
     return found
 
 
-def assert_told(result, code, *words):
-    """That exit code, a message on stderr with these words, and no traceback."""
-    assert result.exit_code == code, result.output
-    assert isinstance(result.exception, SystemExit)
-    assert "Traceback" not in result.output
-    for word in words:
-        assert word in result.stderr
-    assert result.stdout == ""
+@pytest.fixture
+def refused(messages):
+    """refused(result, code, *facts): an error with this exit code, and a message, no traceback.
+
+    The message has each of `facts`; `mask` finds what varies in its text, which is kept.
+    """
+
+    def check(result, code, *facts, mask=None):
+        assert result.exit_code == code, result.output
+        assert isinstance(result.exception, SystemExit)
+        assert "Traceback" not in result.output
+        for fact in facts:
+            assert fact in result.stderr
+        assert result.stdout == ""
+        messages.check(result.stderr, mask)
+
+    return check
 
 
 @pytest.fixture
@@ -117,7 +126,7 @@ def copied(done, directory):
 # --- exit code 0 ------------------------------------------------------------------------------
 
 
-def test_run_tells_the_summary_and_nothing_else_on_stdout(done):
+def test_run_prints_only_summary_on_stdout(done):
     run, result = done
     lines = result.stdout.splitlines()
     # the tube takes the number nearest to 60 that fills both sides
@@ -130,7 +139,7 @@ def test_run_tells_the_summary_and_nothing_else_on_stdout(done):
     assert "wrote" not in result.stdout
 
 
-def test_a_run_directory_holds_what_is_promised(done):
+def test_run_directory_has_documented_files(done):
     run = done[0]
     found = {str(path.relative_to(run)) for path in run.rglob("*") if path.is_file()}
     assert found == {"config.toml", "history.csv", "summary.json"} | {
@@ -146,13 +155,13 @@ def test_a_run_directory_holds_what_is_promised(done):
     }  # fmt: skip
 
 
-def test_the_default_directory_is_named_after_the_configuration(config, tmp_path, monkeypatch):
+def test_default_run_directory_named_after_configuration(config, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     assert sph_("run", "tube.toml", "--set", "time.end=0.01").exit_code == 0
     assert (tmp_path / "runs" / "tube" / "summary.json").exists()
 
 
-def test_set_and_threads(config, tmp_path):
+def test_run_with_set_and_threads(config, tmp_path):
     result = sph_(
         "run", config, "-o", tmp_path / "run", "--set", "physics.alpha=2.0", "--threads", 2,
         "--set", "physics.kernel=wendland_c2", "--set", "time.end = 0.01",
@@ -163,10 +172,10 @@ def test_set_and_threads(config, tmp_path):
     assert (resolved.physics.alpha, resolved.run.threads, resolved.time.end) == (2.0, 2, 0.01)
 
 
-def test_force_replaces_a_run(done, config, tmp_path):
+def test_run_with_force_replaces_run(refused, done, config, tmp_path):
     run = copied(done, tmp_path / "run")
     (run / "notes.txt").write_text("mine")
-    assert_told(sph_("run", config, "-o", run), 4, "already holds a run", "--force", "sph restart")
+    refused(sph_("run", config, "-o", run), 4, "--force", "sph restart")
     assert hashes(run) == hashes(done[0])
     result = sph_("run", config, "-o", run, "--force", "--set", "time.end=0.07")
     assert result.exit_code == 0
@@ -176,7 +185,7 @@ def test_force_replaces_a_run(done, config, tmp_path):
     assert (run / "notes.txt").read_text() == "mine"
 
 
-def test_restart_in_place_and_elsewhere(done, tmp_path):
+def test_restart_in_place_and_into_new_directory(done, tmp_path):
     run = copied(done, tmp_path / "run")
     result = sph_("restart", run, "--set", "time.end=0.25", "--threads", 2)
     assert result.exit_code == 0
@@ -190,7 +199,7 @@ def test_restart_in_place_and_elsewhere(done, tmp_path):
     assert hashes(other) == hashes(run)
 
 
-def test_restart_says_what_else_computed_the_checkpoint(done, tmp_path, monkeypatch):
+def test_restart_on_other_software_notes_difference(done, tmp_path, monkeypatch):
     run = copied(done, tmp_path / "run")
     assert "digits" not in sph_("restart", run, "--set", "time.end=0.201").stderr
     facts = fingerprint.facts() | {"processor": "another"}
@@ -203,17 +212,17 @@ def test_restart_says_what_else_computed_the_checkpoint(done, tmp_path, monkeypa
     assert "digits" not in sph_("restart", run, "--set", "time.end=0.203").stderr
 
 
-def test_more_threads_than_processors_are_told(done, config, tmp_path, monkeypatch):
+def test_more_threads_than_processors_is_noted(done, config, tmp_path, monkeypatch):
     monkeypatch.setattr(runner, "available_processors", lambda: 2)
     asked = ("-o", tmp_path / "run", "--set", "time.end=0.05", "--threads")
-    words = "run.threads = 3, but this process may use 2 processor(s)"
+    words = "run.threads = 3, but this process may use only 2 processor(s)"
     assert words not in sph_("run", config, *asked, 2).stderr
     result = sph_("run", config, "--force", *asked, 3)
     assert words in result.stderr
     assert hashes(tmp_path / "run").items() <= hashes(done[0]).items()
 
 
-def test_restart_says_that_it_passes_over_a_damaged_checkpoint(done, tmp_path):
+def test_restart_with_damaged_checkpoint_notes_skipping_it(done, tmp_path):
     run = copied(done, tmp_path / "run")
     last = run / "checkpoints" / "checkpoint_000004.h5"
     os.truncate(last, 5000)
@@ -235,7 +244,7 @@ def test_shipped_configurations_are_valid(path):
     assert configuration.from_text(resolved.to_toml()) == resolved
 
 
-def test_every_problem_has_a_shipped_configuration_of_its_name():
+def test_every_problem_has_shipped_configuration():
     for name in registry.names("sph.problems"):
         assert configuration.load(CONFIGS / f"{name}.toml").problem.name == name
 
@@ -249,10 +258,16 @@ def test_new_writes_a_valid_configuration(name, tmp_path):
     assert sph_("new", name, "-o", target).stdout == f"wrote {target}\n"
     assert target.read_text() == result.stdout
     assert configuration.load(target).problem.name == name
-    assert_told(sph_("new", name, "-o", target), 4, "already exists", "Try: ")
 
 
-def test_what_new_writes_runs(tmp_path):
+def test_new_existing_target_exits_with_4(refused, tmp_path):
+    target = tmp_path / "new.toml"
+    target.touch()
+    refused(sph_("new", "shock_tube", "-o", target), 4, "new.toml", "Try: ")
+    assert target.read_text() == ""
+
+
+def test_configuration_from_new_runs(tmp_path):
     target = tmp_path / "new.toml"
     sph_("new", "shock_tube", "-o", target)
     result = sph_("run", target, "-o", tmp_path / "run", "--set", "time.end=0.001")
@@ -284,25 +299,24 @@ def test_dry_run_writes_nothing(config, tmp_path, monkeypatch):
 
 
 @pytest.mark.parametrize("command", [[], ["run"], ["restart"], ["plot"], ["new"], ["list"]])
-def test_help(command):
+def test_help_of_every_command(command):
     result = sph_(*command, "--help")
     assert result.exit_code == 0
     assert "Usage: " in result.stdout
 
 
-def test_version():
+def test_version_option():
     assert sph_("--version").stdout == f"sph, version {sph.__version__}\n"
 
 
 # --- exit code 2 ------------------------------------------------------------------------------
 
 
-def test_all_that_is_wrong_is_told_at_once_with_its_line(tmp_path):
+def test_all_config_errors_reported_with_lines(refused, tmp_path):
     path = tmp_path / "bad.toml"
     path.write_text(TUBE.replace("n = 60", "n = 'many'").replace("interval", "intervall"))
     result = sph_("run", path, "-o", tmp_path / "run", "--set", "physics.C=-1")
-    assert_told(result, 2, f"{path}, line 3: problem.n", f"{path}, line 7: output.intervall")
-    assert "did you mean interval?" in result.stderr
+    refused(result, 2, f"{path}, line 3: problem.n", f"{path}, line 7: output.intervall")
     assert "--set physics.C=-1: physics.C" in result.stderr
     assert len(result.stderr.splitlines()) == 3
     assert not (tmp_path / "run").exists()
@@ -312,7 +326,7 @@ def test_all_that_is_wrong_is_told_at_once_with_its_line(tmp_path):
     ("arguments", "words"),
     [
         (["--set", "physics.aplha=1.0"], ["physics.aplha", "alpha"]),
-        (["--set", "physics.alpha"], ["--set physics.alpha: expected TABLE.KEY=VALUE"]),
+        (["--set", "physics.alpha"], ["--set physics.alpha"]),
         (["--set", "physics.gamma=0.9"], ["physics.gamma", "0.9"]),
         (["--set", "physics.kernel=wendland"], ["physics.kernel", "wendland_c2"]),
         (["--set", "problem.name=shock_tub"], ["problem.name", "shock_tube"]),
@@ -322,38 +336,42 @@ def test_all_that_is_wrong_is_told_at_once_with_its_line(tmp_path):
     ],
 )
 @pytest.mark.parametrize("command", ["run", "restart"])
-def test_wrong_settings(command, arguments, words, config, done, tmp_path):
+def test_invalid_set_option_exits_with_2(
+    refused, command, arguments, words, config, done, tmp_path
+):
     source = config if command == "run" else done[0]
     before = hashes(done[0])
     result = sph_(command, source, "-o", tmp_path / "new", *arguments)
-    assert_told(result, 2, *words)
+    refused(result, 2, *words, mask=r"(?s)Usage: .*")  # the words of click
     assert not (tmp_path / "new").exists()
     assert hashes(done[0]) == before
 
 
-def test_not_toml(tmp_path):
+def test_run_invalid_toml_exits_with_2(refused, tmp_path):
     path = tmp_path / "bad.toml"
     path.write_text("[problem]\nname = \n")
-    assert_told(sph_("run", path), 2, f"{path}, line 2", "not valid TOML")
+    refused(sph_("run", path), 2, f"{path}, line 2", mask=r"(?<=TOML: ).*")
 
 
-def test_new_of_an_unknown_problem():
-    assert_told(sph_("new", "shock_tub"), 2, 'problem "shock_tub"', "mean shock_tube?")
+def test_new_unknown_problem_exits_with_2(refused):
+    refused(sph_("new", "shock_tub"), 2, "shock_tub", "shock_tube")
 
 
-def test_a_restart_that_cannot_be(done):
+def test_restart_impossible_change_exits_with_2(refused, done):
     result = sph_("restart", done[0], "--set", "problem.n=61")
-    assert_told(result, 2, "problem.n cannot be changed")
+    refused(result, 2, "problem.n")
 
 
 # --- exit code 3 ------------------------------------------------------------------------------
 
 
-def test_numerical_failure(config, tmp_path):
+def test_numerical_failure_exits_with_3(refused, config, tmp_path):
     run = tmp_path / "run"
     result = sph_("run", config, "-o", run, "--set", "physics.max_energy_drift=1e-15")
     first = run / "checkpoints" / "checkpoint_000000.h5"
-    assert_told(result, 3, "particle ", "offenders.h5", "Try: ", f"`sph restart {first} --set ")
+    facts = ("particle ", "offenders.h5", "Try: ", f"`sph restart {first} --set ")
+    # numbers of a drift at round-off, which vary by machine
+    refused(result, 3, *facts, mask=r" *-?\b\d[\d.]*(e[-+]?\d+)?\b")
     assert json.loads((run / "summary.json").read_text())["status"] == "failed"
     result = sph_(
         "restart", first, "--set", "physics.max_energy_drift=0.02", "--set", "time.end=0.01"
@@ -364,65 +382,65 @@ def test_numerical_failure(config, tmp_path):
 # --- exit code 4 ------------------------------------------------------------------------------
 
 
-def test_missing_files(tmp_path):
-    assert_told(sph_("run", tmp_path / "no.toml"), 4, "no.toml: file not found")
-    assert_told(sph_("run", tmp_path), 4, "a directory")
-    assert_told(sph_("restart", tmp_path / "no"), 4, f"{tmp_path / 'no'} does not exist")
-    assert_told(sph_("restart", tmp_path), 4, "is not a run directory")
+def test_missing_file_exits_with_4(refused, tmp_path):
+    refused(sph_("run", tmp_path / "no.toml"), 4, "no.toml")
+    refused(sph_("run", tmp_path), 4)
+    refused(sph_("restart", tmp_path / "no"), 4, str(tmp_path / "no"))
+    refused(sph_("restart", tmp_path), 4)
 
 
 @pytest.mark.parametrize("command", ["restart", "plot", "report"])
-def test_a_name_that_the_file_system_refuses(command):
-    assert_told(sph_(command, "x" * 300), 4, "x" * 300, "File name too long")
+def test_invalid_file_name_exits_with_4(refused, command):
+    refused(sph_(command, "x" * 300), 4, "x" * 300)
 
 
-def test_what_is_no_good_checkpoint(done, tmp_path):
+def test_invalid_checkpoint_exits_with_4(refused, done, tmp_path):
     good = (done[0] / "checkpoints" / "checkpoint_000002.h5").read_bytes()
     bad = tmp_path / "bad.h5"
     bad.write_text("not HDF5")
-    assert_told(sph_("restart", bad), 4, "is not an HDF5 file")
+    refused(sph_("restart", bad), 4, "bad.h5")
     bad.write_bytes(good[: len(good) // 2])
-    assert_told(sph_("restart", bad), 4, "is truncated or damaged")
+    refused(sph_("restart", bad), 4, "bad.h5", mask=r"Unable to .*(?=\)\.)")  # HDF5's words
     with h5py.File(tmp_path / "other.h5", "w") as file:
         file["x"] = 1.0
-    assert_told(sph_("restart", tmp_path / "other.h5"), 4, "not a checkpoint of sph")
+    refused(sph_("restart", tmp_path / "other.h5"), 4, "other.h5")
     bad.write_bytes(good)
     with h5py.File(bad, "a") as file:
         file["Checkpoint"].attrs["format_version"] = 99
-    assert_told(sph_("restart", bad), 4, "a newer format (99)", "Try: a newer version")
+    refused(sph_("restart", bad), 4, "(99)", "Try: ")
     bad.write_bytes(good)
-    assert_told(sph_("restart", bad), 4, "not in a run directory", "-o DIR")
+    refused(sph_("restart", bad), 4, "-o DIR")
 
 
 @pytest.mark.parametrize("command", ["run", "restart"])
-def test_a_place_that_cannot_be_written(command, config, done, tmp_path):
+def test_unwritable_directory_exits_with_4(refused, command, config, done, tmp_path):
     source = config if command == "run" else RunDirectory(done[0]).checkpoint_path(3)
     (tmp_path / "file").touch()
     for below in ("", "run"):
         result = sph_(command, source, "-o", tmp_path / "file" / below)
-        assert_told(result, 4, "file", "Try: ")
+        refused(result, 4, "file", "Try: ")
 
 
-def test_a_directory_of_something_else(config, tmp_path):
-    assert_told(sph_("run", config, "-o", tmp_path, "--force"), 4, "is not a run directory")
+def test_directory_of_other_files_exits_with_4(refused, config, tmp_path):
+    refused(sph_("run", config, "-o", tmp_path, "--force"), 4)
     assert config.exists()
 
 
 # --- signals ----------------------------------------------------------------------------------
 
 
-def test_an_interrupt_while_loading_is_no_traceback(config, monkeypatch):
+def test_interrupt_while_loading_shows_no_traceback(refused, config, monkeypatch):
     def interrupted(*_):
         raise KeyboardInterrupt
 
     monkeypatch.setattr(configuration, "load", interrupted)
     result = sph_("run", config)
-    assert_told(result, 130, "sph: ended by Ctrl-C")
+    refused(result, 130, "sph: ended by Ctrl-C")
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM], ids=lambda one: one.name)
-def test_a_signal_in_a_run_leaves_a_checkpoint(number, config, tmp_path):
+def test_signal_during_run_writes_checkpoint_and_exits_with_75(number, config, tmp_path):
     process = started(tmp_path, "run", config, "-o", "run", "--set", "time.end=1e6",
                       "--set", "output.interval=1e5")  # fmt: skip
     read_until(process.stderr, "wrote checkpoint_000000.h5")
@@ -441,27 +459,27 @@ def test_a_signal_in_a_run_leaves_a_checkpoint(number, config, tmp_path):
     assert max(hashes(tmp_path / "run")) > last
 
 
-def test_a_second_interrupt_ends_at_once(config, tmp_path, monkeypatch):
-    class Impatient(progress.Lines):
+def test_second_interrupt_ends_at_once(refused, config, tmp_path, monkeypatch):
+    class InterruptingProgress(progress.Lines):
         def step(self, simulation):
             signal.raise_signal(signal.SIGINT)
             signal.raise_signal(signal.SIGINT)
 
-    monkeypatch.setattr(progress, "suited", Impatient)
+    monkeypatch.setattr(progress, "suited", InterruptingProgress)
     handler = signal.signal(signal.SIGINT, signal.default_int_handler)
     try:
         result = sph_("run", config, "-o", tmp_path / "run")
     finally:
         signal.signal(signal.SIGINT, handler)
-    assert_told(result, 130, "wrote checkpoint_000000.h5", "sph: ended by Ctrl-C")
+    refused(result, 130, "wrote checkpoint_000000.h5", "sph: ended by Ctrl-C")
 
 
 @pytest.mark.slow
-def test_a_stop_while_compiling_and_a_restart_equal_a_run_without(config, tmp_path):
+def test_stop_while_compiling_and_restart_equals_uninterrupted_run(config, tmp_path):
     """Also compiled code is the same whether it was just compiled or comes from the cache."""
     cache = {"NUMBA_CACHE_DIR": str(tmp_path / "cache")}
     process = started(tmp_path, "run", config, "-o", "stopped", **cache)
-    read_until(process.stderr, "compiling the code of this scene")
+    read_until(process.stderr, "compiling the code")
     process.send_signal(signal.SIGTERM)
     code, _, err = finished(process)
     assert code == 75, err
@@ -478,7 +496,7 @@ def test_a_stop_while_compiling_and_a_restart_equal_a_run_without(config, tmp_pa
 
 
 @pytest.mark.slow
-def test_a_killed_run_goes_on_from_its_last_good_checkpoint(config, tmp_path):
+def test_killed_run_restarts_from_last_good_checkpoint(config, tmp_path):
     process = started(tmp_path, "run", config, "-o", "run", "--set", "time.end=1e3")
     read_until(process.stderr, "wrote checkpoint_000002.h5")
     process.kill()
@@ -497,7 +515,7 @@ def test_a_killed_run_goes_on_from_its_last_good_checkpoint(config, tmp_path):
     assert steps == list(range(max(hashes(run)) + 1))
 
 
-def test_a_run_that_overflows_speaks_for_itself(config, tmp_path):
+def test_overflow_gives_one_message(config, tmp_path):
     heating = 'physics.heating={ name = "relaxation", energy = 1e308, time = 1e-3 }'
     with warnings.catch_warnings():
         warnings.simplefilter("error")  # NumPy's would be a second account of the same
@@ -505,7 +523,7 @@ def test_a_run_that_overflows_speaks_for_itself(config, tmp_path):
     assert result.exit_code == 3, result.output
 
 
-def test_too_many_particles_for_the_memory(config, tmp_path, monkeypatch):
+def test_out_of_memory_shows_no_traceback(config, tmp_path, monkeypatch):
     def full(*_):
         raise MemoryError("Unable to allocate 763. MiB")
 

@@ -23,7 +23,7 @@ def clock():
         yield made
 
 
-def test_a_phase_adds_up_and_waiting_costs_nothing(clock):
+def test_phase_adds_up_cpu_time_without_waiting(clock):
     for _ in range(2):
         with clock.phase("work"):
             burn(0.02)
@@ -37,7 +37,7 @@ def test_a_phase_adds_up_and_waiting_costs_nothing(clock):
     assert clock.wall >= 0.14
 
 
-def test_compilation_is_no_part_of_a_phase(clock):
+def test_phase_excludes_compilation(clock):
     @njit
     def outer(x):
         return inner(x) + 1.0
@@ -54,7 +54,7 @@ def test_compilation_is_no_part_of_a_phase(clock):
     assert clock.cpu >= clock.seconds["work"]
 
 
-def test_the_first_compilation_is_told_as_it_begins(clock):
+def test_first_compilation_calls_callback_at_its_start(clock):
     told = []
     clock.on_compilation = lambda: told.append(clock.compiling)
 
@@ -71,7 +71,7 @@ def test_the_first_compilation_is_told_as_it_begins(clock):
     assert told == [0.0]
 
 
-def test_a_phase_that_fails_is_counted(clock):
+def test_phase_that_raises_is_counted(clock):
     def fail():
         with clock.phase("work"):
             burn(0.01)
@@ -82,7 +82,7 @@ def test_a_phase_that_fails_is_counted(clock):
     assert clock.seconds["work"] >= 0.01
 
 
-def test_a_closed_clock_hears_nothing(clock):
+def test_closed_clock_ignores_compilation(clock):
     Clock().close()
     other = Clock()
     other.close()
@@ -97,7 +97,7 @@ def test_a_closed_clock_hears_nothing(clock):
 
 
 @pytest.fixture
-def hands(monkeypatch):
+def fake_time(monkeypatch):
     """The times that a clock reads, to be set, and a clock that began at 10 s and 100 s."""
     now = SimpleNamespace(cpu=10.0, wall=100.0)
     read = SimpleNamespace(process_time=lambda: now.cpu, perf_counter=lambda: now.wall)
@@ -106,27 +106,27 @@ def hands(monkeypatch):
         yield now
 
 
-def test_seconds_are_of_cpu_but_for_the_wall_since_the_clock_began(hands):
-    hands.cpu, hands.wall = 13.0, 107.0
-    assert (hands.clock.cpu, hands.clock.wall) == (3.0, 7.0)
+def test_seconds_are_cpu_and_wall_counts_from_start(fake_time):
+    fake_time.cpu, fake_time.wall = 13.0, 107.0
+    assert (fake_time.clock.cpu, fake_time.clock.wall) == (3.0, 7.0)
 
 
-def test_compilation_and_the_start_of_numba_are_counted_apart(hands):
-    clock = hands.clock
+def test_compilation_and_numba_start_counted_apart(fake_time):
+    clock = fake_time.clock
     with clock.phase("work"):
-        hands.cpu += 1.0
+        fake_time.cpu += 1.0
         for length in (2.0, 4.0):
             clock.on_start(None)
-            hands.cpu += length
+            fake_time.cpu += length
             clock.on_start(None)
-            hands.cpu += length
+            fake_time.cpu += length
             clock.on_end(None)
             clock.on_end(None)
     with clock.phase("work"):
-        hands.cpu += 8.0
-        hands.wall += 50.0
+        fake_time.cpu += 8.0
+        fake_time.wall += 50.0
     with clock.phase(STARTING):
-        hands.cpu += 0.5
+        fake_time.cpu += 0.5
     assert clock.compiling == 12.0
     assert clock.seconds == {"work": 9.0, STARTING: 0.5}
     assert clock.cpu == 9.0  # without the other two

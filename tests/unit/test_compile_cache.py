@@ -83,7 +83,7 @@ def in_new_process(directory, **environment):
 # --- damage -----------------------------------------------------------------------------------
 
 
-def test_code_is_kept(cache):
+def test_compiled_code_is_kept_and_private(cache):
     assert called() == (6.0, False)
     assert called() == (6.0, True)
     assert entry(cache()).stat().st_mode & 0o777 == 0o600
@@ -100,7 +100,7 @@ def test_code_is_kept(cache):
     ],
     ids=["empty", "cut", "garbage", "one bit"],
 )
-def test_a_damaged_entry_is_compiled_anew(cache, capsys, damage):
+def test_damaged_entry_is_compiled_again(cache, capsys, damage):
     called()
     path = entry(cache())
     whole = path.read_bytes()
@@ -111,7 +111,7 @@ def test_a_damaged_entry_is_compiled_anew(cache, capsys, damage):
     assert capsys.readouterr().err == ""
 
 
-def test_an_entry_of_another_signature_is_not_taken(cache):
+def test_entry_of_other_signature_is_ignored(cache):
     """As where an entry was renamed."""
     called()
     first = entry(cache())
@@ -126,7 +126,7 @@ def test_an_entry_of_another_signature_is_not_taken(cache):
 
 
 @pytest.mark.parametrize("kind", ["fifo", "directory", "link"])
-def test_what_is_no_file_is_no_entry(cache, kind, tmp_path):
+def test_entry_not_regular_file_is_ignored(cache, kind, tmp_path):
     called()
     path = entry(cache())
     path.rename(tmp_path / "elsewhere")
@@ -153,7 +153,7 @@ def assert_uncached(capsys, *words):
         assert word in told
 
 
-def test_a_full_disk(cache, capsys, monkeypatch):
+def test_full_disk_compiles_and_warns_once(cache, capsys, monkeypatch):
     def full(*_, **__):
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
@@ -163,7 +163,7 @@ def test_a_full_disk(cache, capsys, monkeypatch):
     monkeypatch.undo()
 
 
-def test_a_directory_that_vanishes(cache, capsys):
+def test_deleted_directory_compiles_and_warns(cache, capsys):
     called()
     entry(cache()).unlink()
     opened = cache()
@@ -172,7 +172,7 @@ def test_a_directory_that_vanishes(cache, capsys):
     assert_uncached(capsys, "No such file")
 
 
-def test_a_directory_of_another_user(cache, capsys, monkeypatch):
+def test_directory_of_other_user_is_not_used(cache, capsys, monkeypatch):
     called()
     cache()
     mine = os.geteuid()
@@ -181,13 +181,13 @@ def test_a_directory_of_another_user(cache, capsys, monkeypatch):
 
 
 @pytest.mark.parametrize("mode", [0o770, 0o777])
-def test_a_directory_that_others_can_write_to(cache, capsys, mode):
+def test_directory_writable_by_others_is_not_used(cache, capsys, mode):
     called()
     cache().path.chmod(mode)
     assert_uncached(capsys, "other users can write to it")
 
 
-def test_an_entry_that_others_can_write_to(cache):
+def test_entry_writable_by_others_is_not_used(cache):
     called()
     entry(cache()).chmod(0o666)
     assert called() == (6.0, False)
@@ -195,7 +195,7 @@ def test_an_entry_that_others_can_write_to(cache):
 
 
 @pytest.mark.slow
-def test_a_home_that_cannot_be_written(tmp_path):
+def test_unwritable_home_compiles_and_warns(tmp_path):
     """Commands that compile nothing say nothing of it."""
     nowhere = {"HOME": "/dev/null", "XDG_CACHE_HOME": "/dev/null/cache"}
     (value, hits, misses), told = in_new_process(tmp_path, **nowhere)
@@ -210,7 +210,7 @@ def test_a_home_that_cannot_be_written(tmp_path):
     assert (done.returncode, done.stderr) == (0, "")
 
 
-def test_a_user_without_a_home(cache, capsys, monkeypatch):
+def test_no_home_compiles_and_warns(cache, capsys, monkeypatch):
     monkeypatch.delenv("NUMBA_CACHE_DIR", raising=False)
     monkeypatch.setattr("platformdirs.user_cache_dir", lambda name: f"~/.cache/{name}")
     assert compile_cache.place() is None
@@ -231,7 +231,7 @@ def test_a_user_without_a_home(cache, capsys, monkeypatch):
         ("DEBUGINFO_DEFAULT", 1), ("OF_A_LATER_NUMBA", 1),
     ],
 )  # fmt: skip
-def test_a_setting_that_changes_code(name, value, monkeypatch):
+def test_setting_that_changes_code_changes_key(name, value, monkeypatch):
     before = fingerprint.settings()
     monkeypatch.setattr(numba.core.config, name, value, raising=False)
     after = fingerprint.settings()
@@ -241,13 +241,13 @@ def test_a_setting_that_changes_code(name, value, monkeypatch):
 @pytest.mark.parametrize(
     "name", ["CACHE_DIR", "NUMBA_NUM_THREADS", "DEBUG_CACHE", "DUMP_ASSEMBLY", "CUDA_DRIVER"]
 )
-def test_a_setting_that_changes_no_code(name, monkeypatch):
+def test_setting_that_changes_no_code_keeps_key(name, monkeypatch):
     before = fingerprint.settings()
     monkeypatch.setattr(numba.core.config, name, "another")
     assert fingerprint.settings() == before
 
 
-def test_every_fact_is_in_the_name_of_the_directory(monkeypatch):
+def test_directory_name_depends_on_every_fact(monkeypatch):
     facts = fingerprint.facts()
     assert {"sources of sph", "Numba", "NumPy", "llvmlite", "processor"} < set(facts)
     keys = {fingerprint.key()}
@@ -258,7 +258,7 @@ def test_every_fact_is_in_the_name_of_the_directory(monkeypatch):
 
 
 @pytest.mark.slow
-def test_code_compiled_under_other_settings_is_not_taken(tmp_path):
+def test_code_of_other_settings_is_not_used(tmp_path):
     place = {"NUMBA_CACHE_DIR": str(tmp_path / "cache")}
     assert in_new_process(tmp_path, **place, NUMBA_OPT="0")[0] == [7.0, 0, 1]
     assert in_new_process(tmp_path, **place)[0] == [7.0, 0, 1]
@@ -268,13 +268,13 @@ def test_code_compiled_under_other_settings_is_not_taken(tmp_path):
     assert all(compile_cache.NAME.fullmatch(path.name) for path in directories)
 
 
-def test_code_of_sources_that_were_edited_meanwhile_is_not_kept(cache, monkeypatch):
+def test_code_of_sources_edited_meanwhile_is_not_kept(cache, monkeypatch):
     monkeypatch.setattr(fingerprint, "sources", lambda: "of another edit")
     called()
     assert list(cache().path.iterdir()) == []
 
 
-def test_the_name_of_an_entry_sees_the_file_of_the_function(tmp_path, monkeypatch):
+def test_entry_name_depends_on_source_file(tmp_path, monkeypatch):
     names = set()
     for text in ("def f(x):\n    return g(x)\n", "def f(x):\n    return h(x)\n"):
         path = tmp_path / "module.py"
@@ -286,7 +286,7 @@ def test_the_name_of_an_entry_sees_the_file_of_the_function(tmp_path, monkeypatc
     assert len(names) == 2
 
 
-def test_differences_are_named():
+def test_differences_name_each_fact():
     facts = fingerprint.facts()
     assert fingerprint.differences(fingerprint.as_json()) is None
     then = facts | {"processor": "z80", "NUMBA_OPT": "0", "sources of sph": "0", "more": "1"}
@@ -301,14 +301,14 @@ def test_differences_are_named():
 
 
 @pytest.mark.parametrize("then", [None, "", "{", "[]", b"\xff", 3, "[" * 100_000])
-def test_a_checkpoint_that_names_nothing(then):
+def test_differences_without_facts_are_none(then):
     assert fingerprint.differences(then) is None
 
 
 # --- old directories --------------------------------------------------------------------------
 
 
-def test_old_directories_are_removed_but_for_those_in_use(tmp_path):
+def test_prune_removes_oldest_directories_not_in_use(tmp_path):
     paths = [tmp_path / f"sph-0.1.{k}-{k:016x}" for k in range(6)]
     for age, path in enumerate(paths):
         path.mkdir()
@@ -326,7 +326,7 @@ def test_old_directories_are_removed_but_for_those_in_use(tmp_path):
     assert set(tmp_path.iterdir()) == {paths[0], paths[1], other}
 
 
-def test_a_new_directory_makes_room(tmp_path, monkeypatch):
+def test_new_directory_prunes_old_ones(tmp_path, monkeypatch):
     asked = []
     monkeypatch.setattr(compile_cache, "prune", asked.append)
     for _ in range(2):

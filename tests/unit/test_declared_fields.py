@@ -63,7 +63,7 @@ def poison(simulation):
 
 
 @pytest.mark.parametrize("settings", SCENES, ids=lambda one: " ".join(one) or "as it comes")
-def test_passes_with_undeclared_fields_poisoned_change_nothing(settings):
+def test_passes_with_nan_in_undeclared_fields_give_equal_results(settings):
     simulation = begun(settings)
     expected = {name: array.copy() for name, array in advance(simulation, 8).items()}
     again = begun(settings)
@@ -73,7 +73,7 @@ def test_passes_with_undeclared_fields_poisoned_change_nothing(settings):
 
 
 @pytest.mark.parametrize("settings", SCENES, ids=lambda one: " ".join(one) or "as it comes")
-def test_fields_that_no_order_carries_are_written_before_they_are_read(settings):
+def test_steps_with_nan_in_fields_not_reordered_give_equal_results(settings):
     """NaN in them, wherever lists are built, changes nothing."""
     simulation = begun(settings)
     expected = {name: array.copy() for name, array in advance(simulation, 8).items()}
@@ -97,13 +97,13 @@ def test_fields_that_no_order_carries_are_written_before_they_are_read(settings)
         assert np.abs(moved).max() < 1e-11 * scale, name
 
 
-def test_every_field_has_one_owner():
+def test_fields_have_one_owner():
     for settings in SCENES:
         names = [field.name for field in begun(settings).scene.fields]
         assert len(names) == len(set(names))
 
 
-def test_columns_are_the_energies_and_sums_of_the_parts():
+def test_columns_match_energies_and_sums_of_parts():
     for settings in SCENES:
         simulation = begun(settings)
         for part in simulation.scene.all_parts:
@@ -111,7 +111,7 @@ def test_columns_are_the_energies_and_sums_of_the_parts():
             assert tuple({**part.energies(state), **part.sums(state)}) == part.columns
 
 
-def test_parts_that_keep_state_cannot_be_dropped_by_a_restart():
+def test_part_with_stored_fields_cannot_change_in_restart():
     """A key whose part has columns or fields that cannot be remade is not free to change."""
     for name in registry.names("sph.parts", folders=True):
         kind = registry.part_class("sph.parts", name)

@@ -3,6 +3,7 @@
 The examples of CONTRIBUTING.md are executed.
 """
 
+import ast
 import inspect
 import re
 import shlex
@@ -12,6 +13,7 @@ import pytest
 
 from sph import registry
 from sph.cli import main
+from sph.config.choices import ModelChoice
 from sph.config.sections import SECTIONS
 
 ROOT = Path(__file__).parents[2]
@@ -29,7 +31,9 @@ EXAMPLES = re.findall(
     (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8"),
     re.DOTALL,
 )
-CREATED = {f"{folder}/{name}.py" for folder, name, _ in EXAMPLES} | {"configs/shear_wave.toml"}
+CREATED = {f"{folder}/{name}.py" for folder, name, _ in EXAMPLES} | {
+    "configs/shear_wave.toml", "sph/parts/tether/__init__.py"
+}  # fmt: skip
 
 
 def text_of(document: Path) -> str:
@@ -44,7 +48,7 @@ def anchors(document: Path) -> set[str]:
 
 
 @every_document
-def test_relative_links_lead_to_files_and_headings(document):
+def test_relative_link_targets_exist(document):
     wrong = []
     for link in re.findall(r"\]\(([^)\s]+)\)", text_of(document)):
         if re.match(r"[a-z]+:", link):
@@ -90,7 +94,7 @@ def test_named_keys_exist(document):
 
 
 @every_document
-def test_commands_have_their_options(document):
+def test_options_of_commands_exist(document):
     wrong = []
     for line in re.findall(r"^ *(sph [a-z].*)$|`(sph [a-z].*?)`", text_of(document), re.MULTILINE):
         words = shlex.split(" ".join(line), comments=True)
@@ -109,14 +113,29 @@ def test_readme_lists_every_configuration():
     assert sorted(listed) == sorted(path.stem for path in (ROOT / "configs").glob("*.toml"))
 
 
-def test_contributing_has_an_example_for_each_folder():
+def test_first_lines_of_modules_are_whole_sentences():
+    """`sph list` prints those of models, parts and problems."""
+    texts = {path: path.read_text(encoding="utf-8") for path in (ROOT / "sph").rglob("*.py")}
+    first = {path: (ast.get_docstring(ast.parse(text)) or "") for path, text in texts.items()}
+    lines = {path: said.partition("\n")[0] for path, said in first.items()}
+    assert not {str(path) for path, said in lines.items() if len(said) > 90 or said[-1:] != "."}
+
+
+def test_help_offers_table_of_parameters_only_where_a_model_has_some():
+    offered = ", or a table { name, parameters }"
+    assert ModelChoice("sph.kernels").describe().endswith(offered)
+    assert not ModelChoice("sph.formulations.gas.schemes").describe().endswith(offered)
+
+
+def test_contributing_has_example_for_each_folder():
     assert {folder for folder, _, _ in EXAMPLES} == {
-        "sph/kernels", "sph/schemes", "sph/eos", "sph/viscosity/switches", "sph/problems",
+        "sph/kernels", "sph/formulations/gas/schemes", "sph/eos", "sph/parts/viscosity/switches",
+        "sph/problems",
     }  # fmt: skip
 
 
 @pytest.mark.parametrize(("folder", "name", "code"), EXAMPLES, ids=[one[1] for one in EXAMPLES])
-def test_example_has_what_every_file_of_its_folder_has(folder, name, code):
+def test_example_defines_names_common_to_its_folder(folder, name, code):
     defined = {"__name__": f"example_{name}"}
     exec(compile(code, f"CONTRIBUTING.md, {name}.py", "exec"), defined)
     (example,) = (

@@ -17,7 +17,7 @@ BOX = np.array([[-1.0, 1.0], [0.0, 0.5], [2.0, 5.0]])
         ("mirror", {0.1, -2.1, 1.9}),
     ],
 )
-def test_images_of_a_point_along_one_axis(boundary, expected):
+def test_images_of_point_along_one_axis(boundary, expected):
     sign, offset = Domain(BOX[:1], (boundary,)).images
     assert (sign[0, 0], offset[0, 0]) == (1, 0)  # the identity comes first
     found = sign[:, 0] * 0.1 + offset[:, 0]
@@ -33,7 +33,7 @@ def test_images_of_several_axes_combine():
     assert len(Domain(BOX, ("mirror", "periodic", "mirror")).images.sign) == 27
 
 
-def test_periodic_axis_wraps_however_far_and_leaves_velocity():
+def test_periodic_axis_wraps_any_distance_and_keeps_velocity():
     position = np.array([[-1.0, 0.25, 1.0, 1.5, -1.5, 6.25, -7.25]])
     velocity = np.ones((1, 7))
     Domain(BOX[:1], ("periodic",)).bring_inside(position, [velocity])
@@ -41,13 +41,13 @@ def test_periodic_axis_wraps_however_far_and_leaves_velocity():
     assert np.all(velocity == 1)
 
 
-def test_periodic_axis_has_no_point_on_its_upper_face():
+def test_periodic_axis_excludes_upper_face():
     position = np.array([[-1e-20, 0.5]])  # the first plus the length rounds to the face
     Domain(BOX[1:2], ("periodic",)).bring_inside(position, [])
     np.testing.assert_array_equal(position, [[0, 0]])
 
 
-def test_mirror_turns_particles_back():
+def test_mirror_reflects_particles():
     position = np.array([[-1.25, -1.0, 0.0, 1.0, 1.5], [0.1, 0.2, 0.3, 0.4, 0.5]])
     velocities = [np.full((2, 5), 2.0), np.full((2, 5), 3.0)]
     Domain(BOX[:2], ("mirror", "open")).bring_inside(position, velocities)
@@ -58,7 +58,7 @@ def test_mirror_turns_particles_back():
         np.testing.assert_array_equal(velocity[1], speed)
 
 
-def test_mirror_turns_the_mixed_components_of_a_tensor():
+def test_mirror_negates_mixed_components_of_tensor():
     """A tensor is turned on both sides: T'_ab = s_a s_b T_ab, with s = -1 along the walls met."""
     random = np.random.default_rng(4)
     position = np.array([[0.5, 1.5, 0.5, -1.5], [0.2, 0.2, 0.6, -0.1], [3.0, 3.0, 3.0, 6.0]])
@@ -81,13 +81,13 @@ def test_mirror_turns_the_mixed_components_of_a_tensor():
     np.testing.assert_array_equal(wrapped, before)
 
 
-def test_open_axis_lets_go():
+def test_open_axis_keeps_particles_outside():
     position = np.array([[-9.0, 9.0]])
     Domain(BOX[:1], ("open",)).bring_inside(position, [])
     np.testing.assert_array_equal(position, [[-9.0, 9.0]])
 
 
-def test_supports_may_take_a_thousand_images_of_the_box():
+def test_supports_up_to_a_thousand_images_are_accepted():
     domain = Domain(BOX, ("periodic", "mirror", "open"))  # 2, 0.5 and 3 wide
     domain.check_reach(14.0, 10, 7)  # 15 x 57 images
     words = r"particle 7 needs a support radius of 16, 32 times the shortest side"
@@ -96,7 +96,7 @@ def test_supports_may_take_a_thousand_images_of_the_box():
     Domain(BOX, ("open",) * 3).check_reach(1e9, 10, 7)
 
 
-def test_supports_wider_than_the_box_may_hold_so_many_neighbours():
+def test_supports_wider_than_box_limited_by_neighbour_count():
     domain = Domain(BOX[:1], ("periodic",))  # 2 wide
     domain.check_reach(2.0, 1_000_000, 7)  # no wider: as many as there are
     domain.check_reach(2.5, 40_000, 7)  # 2.5 copies of the box in reach
@@ -106,7 +106,7 @@ def test_supports_wider_than_the_box_may_hold_so_many_neighbours():
 
 @pytest.mark.parametrize("boundary", ["periodic", "mirror"])
 @pytest.mark.parametrize("reach", [0.3, 2.0, 2.1, 5.9, 6.1])
-def test_images_are_all_that_come_within_reach_of_the_box(boundary, reach):
+def test_images_are_all_within_reach_of_box(boundary, reach):
     """Against copies made one after another, by moving or by reflecting at the next wall."""
     domain = Domain(BOX[:1], (boundary,))
     (low, high), x = BOX[0], np.array([-0.9, 0.2, 0.7])
@@ -126,7 +126,7 @@ def test_images_are_all_that_come_within_reach_of_the_box(boundary, reach):
     assert np.all(np.diff(places) > 0.0)  # no copy twice
 
 
-def test_mirrors_turn_a_fast_particle_as_often_as_it_meets_them():
+def test_mirrors_reflect_fast_particle_repeatedly():
     # from 0.25 by -1, then +/- 2 k: walls at -1 and 1, the path repeats after 4
     start, shifts = 0.25, np.array([1.0, 2.0, 3.0, 3.5, -1.5, -3.0, 401.0, -402.5])
     position, velocity = (start + shifts)[None], np.sign(shifts)[None].copy()

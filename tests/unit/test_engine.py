@@ -264,8 +264,8 @@ def run_engine(case, gas, skin, threads):
     for name in ("alpha", "predicted_alpha"):
         if state.get(name) is not None:
             state.get(name)[:] = gas.alpha
-    sweep = passes.Sweep(state, team, ordering.number_of_blocks(count))
-    sweep.models = scene.formulation.models._replace(smoothing=case.smoothing)
+    models = scene.formulation.models._replace(smoothing=case.smoothing)
+    sweep = passes.Sweep(state, team, ordering.number_of_blocks(count), models)
     sweep.dt = STEP
     sweep.wanted.fill(np.nan)
     density, *others = scene.passes
@@ -301,7 +301,7 @@ def eager_order(monkeypatch):
 @pytest.mark.usefixtures("eager_order")
 @pytest.mark.parametrize("lists", ["fresh", "reused", "widened"])
 @pytest.mark.parametrize("case", CASES, ids=str)
-def test_every_rate_is_that_of_the_equations(case, lists):
+def test_rates_match_dense_transcription(case, lists):
     scattered, skin = random_gas(case, lists)
     thinnest = np.diff(case.box).min()
     assert case.thin == 1.0 or scattered.support.max() > 1.5 * thinnest
@@ -333,7 +333,7 @@ def test_every_rate_is_that_of_the_equations(case, lists):
 @pytest.mark.usefixtures("eager_order")
 @pytest.mark.parametrize("lists", ["reused", "widened"])
 @pytest.mark.parametrize("case", CASES[::4], ids=str)
-def test_two_threads_give_the_bits_of_one(case, lists):
+def test_rates_two_threads_equal_one_bit_for_bit(case, lists):
     scattered, skin = random_gas(case, lists)
     _, one, _ = run_engine(case, scattered, skin, threads=1)
     _, two, _ = run_engine(case, scattered, skin, threads=2)
@@ -423,7 +423,7 @@ TRAJECTORIES = [
 
 
 @pytest.mark.parametrize(("case", "count", "end"), TRAJECTORIES, ids=str)
-def test_trajectories_are_those_of_the_equations(case, count, end, monkeypatch):
+def test_trajectories_match_dense_transcription(case, count, end, monkeypatch):
     gas = moving_gas(case.box, count)
     run, times = simulate(case, gas, end)
     expected = dense.start(case.dense_scene, *gas)

@@ -55,7 +55,7 @@ def python(*arguments, directory=ROOT, **environment):
         ("sph.cli", ["plot", "tube.toml"], "sph.analysis.figures"),
     ],
 )
-def test_a_signal_during_an_import_ends_in_one_line(number, program, command, module, tmp_path):
+def test_signal_during_import_ends_with_one_line(number, program, command, module, tmp_path):
     (tmp_path / "tube.toml").write_text(TUBE)
     code = HOOK.format(module=module, number=int(number), arguments=command, program=program)
     done = python("-c", code, directory=tmp_path)
@@ -66,7 +66,7 @@ def test_a_signal_during_an_import_ends_in_one_line(number, program, command, mo
     assert os.listdir(tmp_path) == ["tube.toml"]
 
 
-def test_a_signal_that_is_ignored_stays_so():
+def test_ignored_signal_stays_ignored():
     code = HOOK.format(module="click", number=2, arguments=["--version"], program="sph")
     ignoring = f"import signal; signal.signal(signal.SIGINT, signal.SIG_IGN)\n{code}"
     done = python("-c", ignoring)
@@ -75,20 +75,20 @@ def test_a_signal_that_is_ignored_stays_so():
 
 @pytest.mark.slow
 @pytest.mark.parametrize("command", [["list"], ["--help"], ["sweep", "--help"], ["new", "gresho"]])
-def test_python_without_docstrings_says_the_same(command):
+def test_output_without_docstrings_is_equal(command):
     plain, without = (python("-m", "sph", *command, PYTHONOPTIMIZE=level) for level in ("", "2"))
     assert (without.returncode, without.stderr) == (0, "")
     assert without.stdout == plain.stdout
 
 
-def test_docstrings():
+def test_docstring_read_from_source():
     assert docstring(sys.modules[__name__]) == __doc__
     assert docstring(python) == ""
     assert docstring(docstring).startswith("Return the docstring of a module, class or function")
 
 
 @pytest.mark.parametrize("missing", ["fcntl", "resource"])
-def test_a_system_that_is_not_posix(missing):
+def test_system_without_posix_exits_with_4(missing):
     code = f"import sys; sys.modules[{missing!r}] = None; from sph.__main__ import main; main()"
     done = python("-c", code)
     assert (done.returncode, done.stdout) == (4, "")

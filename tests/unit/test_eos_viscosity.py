@@ -16,7 +16,7 @@ FEW_ROUNDINGS = 1e-14  # of some operations at 1e-16 each
 DENSITY, ENERGY = np.array([0.125, 1.0, 4.0]), np.array([2.0, 0.5, 1e-12])
 
 
-def test_ideal_gas_by_hand():
+def test_ideal_gas_matches_by_hand():
     gas = eos.make("ideal_gas", gamma=1.4)
     # Sod's two states: u = 2.5 and 2 give P = 1 and 0.1; c² = 1.4 P / rho
     np.testing.assert_allclose(gas.pressure(np.array([1, 0.125]), np.array([2.5, 2])), [1, 0.1])
@@ -25,7 +25,7 @@ def test_ideal_gas_by_hand():
     )
 
 
-def test_stiffened_gas_by_hand():
+def test_stiffened_gas_matches_by_hand():
     water = eos.make("stiffened_gas", gamma=4.4, p_inf=6e8)
     # u = (1e5 + 4.4 x 6e8)/(3.4 x 1000); c² = 4.4 x 6.001e8/1000
     assert water.internal_energy(1000.0, 1e5) == pytest.approx(776500.0, rel=FEW_ROUNDINGS)
@@ -36,7 +36,7 @@ def test_stiffened_gas_by_hand():
     assert water.pressure(800.0, water.lowest_energy(800.0)) == pytest.approx(-6e8, abs=1e-5)
 
 
-def test_which_equations_of_state_have_exact_solutions():
+def test_equations_of_state_with_exact_solutions():
     gas = eos.make("ideal_gas", gamma=1.4)
     assert eos.is_ideal(gas)
     assert eos.is_gamma_law(gas)
@@ -55,7 +55,7 @@ PARAMETERS = {
 
 
 @pytest.mark.parametrize("name", registry.names("sph.eos"))
-def test_energy_and_pressure_are_inverse_and_sound_has_its_speed(name):
+def test_energy_inverts_pressure_and_sound_speed_is_consistent(name):
     parameters, energy = PARAMETERS[name]
     gas = eos.make(name, **parameters)
     pressure = gas.pressure(DENSITY, energy)
@@ -68,13 +68,13 @@ def test_energy_and_pressure_are_inverse_and_sound_has_its_speed(name):
     )
 
 
-def test_constant_alpha_is_of_no_particle():
+def test_constant_alpha_is_one_number():
     model = constant.ConstantAlpha(1.5)
     assert not model.evolves
     assert model.start() == model.pair_alpha(0.0, 9.0) == 1.5
 
 
-def test_alpha_rises_in_compression_and_decays():
+def test_alpha_morris_monaghan_rises_in_compression_and_decays():
     model = morris_monaghan.MorrisMonaghan(0.1, 2.1)
     assert model.evolves
     assert model.start() == 0.1
@@ -85,7 +85,7 @@ def test_alpha_rises_in_compression_and_decays():
     np.testing.assert_allclose(rate, [6, 3 - 5, -5, -10], rtol=FEW_ROUNDINGS)
 
 
-def test_alpha_of_shocks_jumps_up_and_decays_exactly():
+def test_alpha_cullen_dehnen_jumps_up_and_decays_exactly():
     model = cullen_dehnen.CullenDehnen(0.1, 2.0, ell=0.05)
     assert model.evolves
     assert model.start() == 0.1
@@ -104,7 +104,7 @@ def test_alpha_of_shocks_jumps_up_and_decays_exactly():
     assert model.alpha_after(0.1, 1.0, 0.5, 2.0, 0.0, -1.0, 0.0, 0.0) == 0.1
 
 
-def test_balsara_tells_compression_from_shear():
+def test_balsara_distinguishes_compression_from_shear():
     model = balsara.Balsara()
     # by hand: |div| / (|div| + curl + 1e-4 c/H), c/H = 20 where it counts
     np.testing.assert_allclose(
@@ -121,7 +121,7 @@ def _shares(h, laplacian, energy, signal_speed):
     return share(h, laplacian, energy, signal_speed)
 
 
-def test_conductivity_acts_where_the_energy_bends():
+def test_switched_conductivity_acts_where_energy_is_curved():
     # by hand: h^2 |lap u| / (v_sig sqrt(u)) = 0.04 * 30 / (2 * 1.5), and all of it at most
     for laplacian, expected in [(30.0, 0.4), (-30.0, 0.4), (0.0, 0.0), (300.0, 1.0)]:
         assert _shares(0.2, laplacian, 2.25, 2.0) == pytest.approx(expected, rel=FEW_ROUNDINGS)
@@ -148,7 +148,7 @@ def _compiled_shock(model, alpha, dt, support, signal_speed, divergence, rate, s
     return alpha_after(model, alpha, dt, support, signal_speed, divergence, rate, shear, signs)
 
 
-def test_compiled_code_finds_the_same_numbers():
+def test_compiled_models_equal_python():
     gas, model, limiter = (
         eos.make("ideal_gas", gamma=1.4),
         morris_monaghan.MorrisMonaghan(0.1, 2.0),

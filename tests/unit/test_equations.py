@@ -59,12 +59,12 @@ def stated() -> list[int]:
         ("Toro eq 4.5, eqs 14.42-14.43 and eq 106.3", []),
     ],
 )
-def test_citations_are_told_from_those_of_other_publications(text, numbers):
+def test_citation_of_other_publication_is_ignored(text, numbers):
     assert [number for _, number in cited(text)] == numbers
 
 
 @pytest.mark.parametrize("tree", [CODE, ROOT / "docs"], ids=["code", "docs"])
-def test_every_equation_cited_is_stated(tree):
+def test_cited_equations_are_stated(tree):
     known = set(stated())
     files = sorted(tree.rglob("*.py")) if tree == CODE else sorted(tree.glob("*.md"))
     citations = [
@@ -79,7 +79,7 @@ def test_every_equation_cited_is_stated(tree):
     assert not missing, "\n".join(missing)
 
 
-def test_numbers_are_unique_and_each_has_a_formula():
+def test_equation_numbers_are_unique_and_have_formula():
     text = PAGE.read_text("utf-8")
     numbers = stated()
     assert len(numbers) == len(set(numbers))
@@ -91,14 +91,14 @@ def test_numbers_are_unique_and_each_has_a_formula():
     assert not without
 
 
-def test_files_named_on_the_page_exist():
+def test_files_named_on_page_exist():
     named = set(re.findall(r"`(\w+\.py)`", PAGE.read_text("utf-8")))
     assert named
     assert named - {path.name for path in CODE.rglob("*.py")} == set()
 
 
 @pytest.mark.parametrize("kernel", registry.names("sph.kernels"))
-def test_support_ratios_on_the_page_are_those_of_the_code(kernel):
+def test_support_ratio_on_page_matches_code(kernel):
     row = re.search(rf"^\| `{kernel}` \|(.*)\|$", PAGE.read_text("utf-8"), re.M)
     stated = [float(cell) for cell in row[1].split("|")[:3]]
     found = [kernels.support_ratio(kernels.make(kernel), dimension) for dimension in (1, 2, 3)]

@@ -96,7 +96,7 @@ def test_added_models_and_part_run_restart_and_plot(sph, tmp_path):
     assert 0.02 < path[-1] < 0.1
 
 
-def test_added_part_bounds_the_step(sph, tmp_path):
+def test_added_part_limits_step(sph, tmp_path):
     file = configured(tmp_path / "stiff.toml", "tether = 1e6")
     told = sph("-m", "sph", "run", file, "-o", tmp_path / "run", "--set", "time.end=0.001")
     rows = list(csv.DictReader((tmp_path / "run" / "history.csv").open()))
@@ -105,7 +105,7 @@ def test_added_part_bounds_the_step(sph, tmp_path):
     assert "done" in told
 
 
-def test_added_part_refuses_what_it_cannot_serve(sph, tmp_path):
+def test_added_part_refuses_unsupported_settings(sph, tmp_path):
     file = configured(tmp_path / "scene.toml", "tether = 1.0")
     told = sph(
         "-m", "sph", "run", file, "-o", tmp_path / "run", "--set", "problem.boundary=periodic",
@@ -140,7 +140,7 @@ def test_added_formulation_runs_restarts_and_plots(sph, tmp_path):
     assert np.abs(found - exact).mean() < 0.022
 
 
-def test_model_of_a_known_name_is_refused(sph, tmp_path):
+def test_model_with_existing_name_is_refused(sph, tmp_path):
     twin = tmp_path / "path" / "sph_extensions" / "kernels" / "twin.py"
     twin.write_text((ROOT / "sph" / "kernels" / "wendland_c4.py").read_text())
     told = sph(
@@ -153,7 +153,7 @@ def test_model_of_a_known_name_is_refused(sph, tmp_path):
     assert "both define a model WendlandC4" in told
 
 
-def test_edited_extension_is_compiled_anew(sph, tmp_path):
+def test_edited_extension_is_recompiled(sph, tmp_path):
     """Code on disk is named by the sources of extensions too: stale code would be silent."""
     program = (
         "from sph import registry, fingerprint; print(fingerprint.key()); "

@@ -38,7 +38,7 @@ def begin(simulate):
 
 @pytest.mark.parametrize("softening", [0.0, 0.3])
 @pytest.mark.parametrize("dimension", [1, 2, 3])
-def test_the_pull_of_a_point_mass_is_the_slope_of_its_potential(dimension, softening):
+def test_point_mass_acceleration_equals_slope_of_potential(dimension, softening):
     field = PointMass(2.0, softening)
     x = np.random.default_rng(1).normal(size=(dimension, 5))
     e = 1e-5
@@ -55,11 +55,11 @@ def test_the_pull_of_a_point_mass_is_the_slope_of_its_potential(dimension, softe
     assert field.potential(far)[0] == pytest.approx(-2.0 / r, rel=1e-5)
 
 
-def test_a_particle_in_the_very_centre_is_not_pulled():
+def test_point_mass_at_centre_has_no_acceleration():
     assert (PointMass(1.0).acceleration(np.zeros((3, 1))) == 0).all()
 
 
-def test_a_pulled_gas_keeps_kinetic_internal_and_potential_energy(begin):
+def test_gas_in_external_field_conserves_total_energy(begin):
     """Gas at rest falls towards a softened mass in the corner of a closed box."""
     pull = 'physics.external={name="point_mass",mass=1.0,softening=0.5}'
     drift = {}
@@ -78,7 +78,7 @@ def test_a_pulled_gas_keeps_kinetic_internal_and_potential_energy(begin):
     assert drift[0.2] < 1e-4
 
 
-def test_relaxation_is_exact_however_long_the_step():
+def test_relaxation_any_step_is_exact():
     source = Relaxation(energy=2.0, time=0.1)
     u = np.array([1.0, 2.0, 5.0])
     for dt in (1e-3, 0.1, 10.0, 1e6):
@@ -86,7 +86,7 @@ def test_relaxation_is_exact_however_long_the_step():
 
 
 @pytest.mark.parametrize("tau", [1e-12, 1e-2, 1.0])
-def test_a_stiff_source_does_not_shorten_the_step(begin, tau):
+def test_stiff_heating_does_not_limit_step(begin, tau):
     """Uniform gas stays uniform, so its energy follows the source alone, in as many steps."""
     plain = begin([])
     heated = begin([f'physics.heating={{name="relaxation",energy=1.8,time={tau}}}'])
@@ -107,7 +107,7 @@ def test_a_stiff_source_does_not_shorten_the_step(begin, tau):
     assert heated.energy_added == pytest.approx(gained, rel=1e-9)
 
 
-def test_the_rates_of_a_step_see_the_energy_that_it_ends_with(begin):
+def test_rates_use_energy_after_heating(begin):
     """Heating of both halves: with the first alone pressures would lag by half a step."""
     heated = begin(['physics.heating={name="relaxation",energy=18.0,time=0.01}'])
     u, dt = heated.particles.internal_energy[0], heated.limit.dt
@@ -117,7 +117,7 @@ def test_the_rates_of_a_step_see_the_energy_that_it_ends_with(begin):
     assert heated.particles.predicted_energy == pytest.approx(expected, rel=1e-12)
 
 
-def test_a_scene_without_them_has_neither(begin):
+def test_scene_without_field_and_heating_has_neither(begin):
     _inside, outside = begin([]).scene.described()
     assert "external field: physics.external is not given" in outside
     assert "heating: physics.heating is not given" in outside

@@ -19,7 +19,7 @@ from sph.simulation import Simulation
 from sph.watchdog import Watchdog
 
 
-class Placed(uniform.Problem):
+class GivenParticles(uniform.Problem):
     """Gas at rest where a test puts it, of one energy."""
 
     places: list
@@ -49,7 +49,7 @@ def begin(simulate):
         }
         config = dataclasses.replace(
             config,
-            problem=Placed(**settings),
+            problem=GivenParticles(**settings),
             physics=type(config.physics)(**(config.physics.model_dump() | physics)),
         )
         return simulate(config)
@@ -71,7 +71,7 @@ def advance(simulation, steps=3):
 
 
 @pytest.mark.parametrize("dimension", [1, 2, 3])
-def test_one_particle_alone_has_the_largest_support(begin, dimension):
+def test_single_particle_has_largest_support(begin, dimension):
     simulation = begin(np.full((dimension, 1), 0.5), "open", max_support=0.5)
     p = simulation.particles
     assert (p.support[0], p.omega[0], simulation.held_supports) == (0.5, 1.0, 1)
@@ -85,7 +85,7 @@ def test_one_particle_alone_has_the_largest_support(begin, dimension):
 
 @pytest.mark.parametrize("apart", [0.0, 1e-12, 0.3, 0.99])
 @pytest.mark.parametrize("dimension", [1, 3])
-def test_two_particles_only(begin, dimension, apart):
+def test_two_particles_have_largest_support(begin, dimension, apart):
     places = np.full((dimension, 2), 0.001)
     places[0, 1] += apart
     simulation = begin(places, "open")
@@ -93,7 +93,7 @@ def test_two_particles_only(begin, dimension, apart):
     assert simulation.held_supports == 2
 
 
-def test_a_particle_far_away_is_held_and_the_others_are_not(begin):
+def test_distant_particle_has_limited_support_others_not(begin):
     places = np.append(np.linspace(0.0, 0.1, 60), 3.0)[None]
     simulation = begin(places, "open")
     assert simulation.held_supports == 1
@@ -106,7 +106,7 @@ def test_a_particle_far_away_is_held_and_the_others_are_not(begin):
     advance(simulation)
 
 
-def test_a_line_of_particles_in_space(begin):
+def test_line_of_particles_in_3d_advances(begin):
     places = np.full((3, 30), 0.5)
     places[0] = np.linspace(0.0, 1.0, 30)
     # a step of the default length is too long where supports grow by a fifth in it
@@ -117,7 +117,7 @@ def test_a_line_of_particles_in_space(begin):
 
 
 @pytest.mark.parametrize("boundary", ["periodic", "mirror"])
-def test_few_particles_in_a_closed_box_have_their_images_for_neighbours(begin, boundary):
+def test_few_particles_in_closed_box_use_images_as_neighbours(begin, boundary):
     simulation = begin(np.array([[0.5, 0.6], [0.5, 0.5]]), boundary)
     assert simulation.particles.support.min() > 1.0  # the box is 1 wide
     # two particles of one mass, spread over the box: the lattice of their images is a good one
@@ -126,12 +126,12 @@ def test_few_particles_in_a_closed_box_have_their_images_for_neighbours(begin, b
     advance(simulation)
 
 
-def test_in_a_closed_box_the_particle_is_named(begin):
+def test_missing_neighbours_in_closed_box_names_particle(begin):
     with pytest.raises(NumericalError, match=r"particle \d+ needs .* times the shortest side"):
         begin(np.array([[0.5, 0.6], [0.5, 0.5]]), "periodic", eta=1e3)
 
 
-def test_a_thin_slab_does_what_a_thick_one_of_its_copies_does(begin):
+def test_thin_periodic_slab_equals_thick_slab_of_copies(begin):
     """One layer of gas, several times thinner than a support, and ten of them side by side."""
     random = np.random.default_rng(4)
     thin = np.array([(np.arange(40) + random.uniform(0.3, 0.7, 40)) / 40, np.full(40, 0.5)])
@@ -153,14 +153,16 @@ def test_a_thin_slab_does_what_a_thick_one_of_its_copies_does(begin):
         np.testing.assert_allclose(copies, np.tile(expected, (10, 1)), rtol=0, atol=1e-8 * size)
 
 
-def test_too_many_in_one_place_are_named_and_counted(begin):
+def test_too_many_coincident_particles_named_and_counted(begin):
     places = np.append(np.linspace(0.01, 0.99, 50), np.full(5, 0.505))[None]
-    with pytest.raises(NumericalError, match=r"particle \d+ at \(0.505\): 4 other\(s\)") as raised:
+    with pytest.raises(
+        NumericalError, match=r"particle \d+ at \(0.505\): 4 other particle\(s\)"
+    ) as raised:
         begin(places, "open")
     assert "Try: " in str(raised.value)
 
 
-def test_coincident_pairs(begin):
+def test_coincident_pairs_advance(begin):
     random = np.random.default_rng(2)
     places = np.tile(random.random((3, 100)), 2)
     simulation = begin(places, "periodic", eta=1.2)
@@ -168,19 +170,19 @@ def test_coincident_pairs(begin):
 
 
 @pytest.mark.parametrize("boundary", ["periodic", "mirror"])
-def test_on_the_very_boundary(begin, boundary):
+def test_particles_on_boundary_advance(begin, boundary):
     axis = np.linspace(0.0, 1.0, 13)
     axis = axis[:-1] if boundary == "periodic" else axis
     places = np.array(np.meshgrid(axis, axis)).reshape(2, -1)
     # in a corner of walls there are three images in the very place, and no room for a fourth
     advance(begin(places, boundary))
     if boundary == "mirror":
-        with pytest.raises(NumericalError, match=r"at \(0, 0\): 3 other\(s\)"):
+        with pytest.raises(NumericalError, match=r"at \(0, 0\): 3 other particle\(s\)"):
             begin(places, boundary, eta=1.2)
 
 
 @pytest.mark.parametrize(("density", "dimension"), [("mass", 1), ("number", 1), ("number", 2)])
-def test_masses_apart_by_a_million(begin, density, dimension):
+def test_mass_ratio_of_a_million_advances(begin, density, dimension):
     """Light gas on one side, heavy on the other. (By mass, in 2-D, the step collapses, said so.)"""
     n = (400, 40)[dimension - 1]
     axis = (np.arange(n) + 0.5) / n
@@ -191,7 +193,7 @@ def test_masses_apart_by_a_million(begin, density, dimension):
 
 
 @pytest.mark.parametrize("factor", [0.01, 3.0, 100.0])
-def test_random_particles_from_a_bad_first_guess(begin, monkeypatch, factor):
+def test_random_particles_bad_first_guess_converges(begin, monkeypatch, factor):
     places = np.random.default_rng(1).random((3, 2000))
     expected = begin(places, "periodic").particles.by_id()
     guess = first_guess.from_spacing
@@ -206,7 +208,7 @@ def test_random_particles_from_a_bad_first_guess(begin, monkeypatch, factor):
 # --- each guard is what keeps its case from going wrong -----------------------------------------
 
 
-def test_without_trimming_a_wide_guess_lists_every_particle_for_every_block(begin, monkeypatch):
+def test_wide_first_guess_without_trimming_lists_everything(begin, monkeypatch):
     places = np.random.default_rng(1).random((2, 2000))
     guess = first_guess.from_spacing
     monkeypatch.setattr(first_guess, "from_spacing", lambda *a: 100.0 * guess(*a))
@@ -221,13 +223,13 @@ def test_without_trimming_a_wide_guess_lists_every_particle_for_every_block(begi
 
 
 @pytest.mark.parametrize("count", [1, 2])
-def test_without_a_largest_support_lonely_particles_end_the_run(begin, monkeypatch, count):
+def test_lonely_particles_without_largest_support_end_run(begin, monkeypatch, count):
     monkeypatch.setattr(Scene, "max_support", np.inf)
-    with pytest.raises(NumericalError, match="no support small enough for particle 1"):
+    with pytest.raises(NumericalError, match="no support radius is small enough for particle 1 "):
         begin(np.linspace(0.4, 0.6, count)[None], "open")
 
 
-def test_without_the_count_of_those_in_one_place_numbers_mean_nothing(begin, monkeypatch):
+def test_coincident_particles_without_count_give_unphysical_values(begin, monkeypatch):
     places = np.append(np.linspace(0.01, 0.99, 50), np.full(5, 0.505))[None]
     monkeypatch.setattr(Simulation, "_check_found", lambda *_: None)
     with pytest.raises(NumericalError, match="density of particle"):  # the watchdog's, no reason
@@ -236,7 +238,7 @@ def test_without_the_count_of_those_in_one_place_numbers_mean_nothing(begin, mon
     assert begin(places, "open").particles.density.min() < 0.0
 
 
-def test_counted_passes_run_away_at_a_jump_of_mass_unless_it_is_solved_for(begin):
+def test_counted_passes_at_mass_jump_diverge_without_solver(begin):
     x = (np.arange(200) + 0.5) / 200
     mass = np.where(x < 0.5, 1.0, 0.01) / 200
 

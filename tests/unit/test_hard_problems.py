@@ -34,7 +34,7 @@ def particles_of(problem, gas, **fields):
 # --- a ball that expands ----------------------------------------------------------------------
 
 
-def test_ball_of_monatomic_gas_grows_as_the_closed_form():
+def test_expanding_ball_monatomic_matches_closed_form():
     # D (gamma - 1) = 2: then R^2 = R_0^2 + (final speed)^2 t^2
     for time in (0.1, 1.0, 30.0):
         radius, speed = expanding_ball.radius(time, 2.0, 0.7, 5.0 / 3.0, 3)
@@ -47,7 +47,7 @@ def test_ball_of_monatomic_gas_grows_as_the_closed_form():
 
 
 @pytest.mark.parametrize("dimension", [1, 2, 3])
-def test_expanding_ball_keeps_its_energy_and_solves_euler(dimension):
+def test_expanding_ball_conserves_energy_and_solves_euler(dimension):
     problem = ExpandingBall(dimension=dimension, n=100, domain=[-2.0, 2.0], pressure=0.6)
     surface = (2.0, 2.0 * np.pi, 4.0 * np.pi)[dimension - 1]
 
@@ -79,7 +79,7 @@ def test_expanding_ball_keeps_its_energy_and_solves_euler(dimension):
 @pytest.mark.parametrize(
     ("dimension", "n", "lattice"), [(1, 400, "cubic"), (2, 4000, "hexagonal"), (3, 8000, "bcc")]
 )
-def test_particles_of_the_ball_carry_its_profile(dimension, n, lattice):
+def test_expanding_ball_particles_sample_profile(dimension, n, lattice):
     problem = ExpandingBall(dimension=dimension, n=n, lattice=lattice, domain=[-1.0, 3.0])
     state = problem.initial(MONATOMIC)
     radius = np.linalg.norm(state.position - 1.0, axis=0) / 2.0
@@ -103,7 +103,7 @@ def test_particles_of_the_ball_carry_its_profile(dimension, n, lattice):
 
 
 @pytest.mark.parametrize(("dimension", "n", "layers"), [(1, 200, 200), (3, 4096, 16)])
-def test_masses_carry_the_contrast_of_evenly_spaced_particles(dimension, n, layers):
+def test_contrast_equal_spacing_uses_unequal_masses(dimension, n, layers):
     step = Contrast(dimension=dimension, n=n).initial(MONATOMIC)
     assert step.mass.max() / step.mass.min() == pytest.approx(1e6, rel=1e-12)
     assert step.mass.sum() == pytest.approx(0.5 * (1.0 + 1e-6), rel=1e-12)
@@ -115,7 +115,7 @@ def test_masses_carry_the_contrast_of_evenly_spaced_particles(dimension, n, laye
 
 
 @pytest.mark.parametrize(("dimension", "n", "ratio"), [(1, 4000, 1e3), (2, 4000, 30), (3, 8000, 8)])
-def test_spacings_carry_the_contrast_of_particles_of_one_mass(dimension, n, ratio):
+def test_contrast_equal_masses_uses_unequal_spacing(dimension, n, ratio):
     problem = Contrast(dimension=dimension, n=n, ratio=ratio, profile="graded", masses="equal")
     state = problem.initial(MONATOMIC)
     assert state.mass.size == pytest.approx(n, rel=0.02)
@@ -135,17 +135,17 @@ def test_spacings_carry_the_contrast_of_particles_of_one_mass(dimension, n, rati
     assert (distance / spacing).min() > 0.6
 
 
-def test_step_of_one_mass_is_another_problem():
+def test_contrast_step_with_equal_masses_is_refused():
     with pytest.raises(ValidationError, match="shock_tube"):
         Contrast(masses="equal")
 
 
-def test_thin_gas_of_less_than_a_support_is_refused():
+def test_contrast_thin_gas_narrower_than_support_is_refused():
     with pytest.raises(ValidationError, match=r"expected 4\."):
         Contrast(dimension=2, n=1000, masses="equal", profile="graded")
 
 
-def test_contrast_reports_what_moves():
+def test_contrast_report_measures_motion():
     problem = Contrast()
     n = problem.initial(MONATOMIC).mass.size
     velocity = np.zeros((1, n))
@@ -163,13 +163,13 @@ def test_contrast_reports_what_moves():
 # --- blob -------------------------------------------------------------------------------------
 
 
-def test_a_cloud_without_a_wind_is_refused():
+def test_blob_without_wind_is_refused():
     with pytest.raises(ValidationError, match="mach"):  # growth times are counted in its speed
         Blob(mach=0.0)
 
 
 @pytest.mark.parametrize(("dimension", "n"), [(2, 4000), (3, 20000)])
-def test_cloud_is_dense_cold_and_at_rest_in_its_wind(dimension, n):
+def test_blob_cloud_is_dense_cold_and_at_rest(dimension, n):
     problem = Blob(dimension=dimension, n=n)
     particles = particles_of(problem, MONATOMIC)
     inside = np.linalg.norm(particles.position, axis=0) < 1.0
@@ -185,7 +185,7 @@ def test_cloud_is_dense_cold_and_at_rest_in_its_wind(dimension, n):
     assert report["cloud_velocity"] == report["growth_times"] == 0.0
 
 
-def test_gas_that_was_heated_or_thinned_is_no_cloud():
+def test_blob_heated_or_thinned_gas_is_not_cloud():
     problem = Blob(n=4000)
     particles = particles_of(problem, MONATOMIC)
     cloud = np.linalg.norm(particles.position, axis=0) < 1.0
@@ -197,7 +197,7 @@ def test_gas_that_was_heated_or_thinned_is_no_cloud():
     assert problem.diagnostics(particles)["cloud_mass_fraction"] == 0.0
 
 
-def test_wind_needs_room_around_the_cloud():
+def test_blob_cloud_too_large_for_box_is_refused():
     with pytest.raises(ValidationError, match="expected a diameter below"):
         Blob(radius=5.0)
 
@@ -221,7 +221,7 @@ def test_ring_is_uniform_and_on_circular_orbits():
     }
 
 
-def test_ring_counts_orbits_until_it_breaks():
+def test_ring_report_counts_orbits_until_break():
     problem = KeplerianRing()
     t = 2.0 * np.pi * np.linspace(0.0, 4.0, 9)
     whole = {"t": t, "density_deviation": np.full(9, 0.09), "radial_deviation": np.full(9, 0.019)}
@@ -239,7 +239,7 @@ def test_ring_counts_orbits_until_it_breaks():
 # --- particles one by one ---------------------------------------------------------------------
 
 
-def test_particles_are_those_that_were_given():
+def test_given_particles_are_used():
     problem = Given(
         dimension=2,
         positions=[[0.0, 1.0], [0.5, -1.0], [0.5, -1.0]],
@@ -255,7 +255,7 @@ def test_particles_are_those_that_were_given():
     np.testing.assert_array_equal(state.internal_energy, [0.5, 0.5, 0.5])
 
 
-def test_centre_of_mass_is_found_to_have_left_its_path():
+def test_given_particles_report_centre_of_mass_error():
     problem = Given(positions=[[0.0], [1.0]], velocities=[[1.0], [0.0]], masses=[3.0, 1.0])
     particles = particles_of(problem, AIR, density=np.ones(2))
     particles.position = particles.position + 2.0 * problem.initial(AIR).velocity
@@ -279,7 +279,7 @@ def test_centre_of_mass_is_found_to_have_left_its_path():
         ({"positions": []}, "at least 1 item"),
     ],
 )
-def test_particles_that_do_not_fit_are_refused(keys, message):
+def test_given_particles_of_wrong_shape_are_refused(keys, message):
     with pytest.raises(ValidationError, match=message):
         Given(**({"positions": [[0.0], [1.0]]} | keys))
 
@@ -288,7 +288,7 @@ def test_particles_that_do_not_fit_are_refused(keys, message):
 
 
 @pytest.mark.parametrize("lattice", ["cubic", "bcc", "relaxed"])
-def test_energy_of_one_particle_is_released_in_the_very_centre(lattice):
+def test_point_explosion_one_particle_releases_energy_at_centre(lattice):
     problem = PointExplosion(n=1000, lattice=lattice, energy_particles=1)
     state = problem.initial(MONATOMIC)
     (hot,) = np.flatnonzero(state.internal_energy > 1.0)
@@ -302,7 +302,7 @@ def test_energy_of_one_particle_is_released_in_the_very_centre(lattice):
     np.testing.assert_allclose(np.sort(nearest), np.sort(expected), atol=1e-12)
 
 
-def test_random_particles_have_no_order():
+def test_uniform_random_placement_has_no_lattice():
     problem = Uniform(dimension=3, n=20000, lattice="random", seed=3)
     position = problem.initial(AIR).position
     assert position.shape == (3, 20000)
@@ -313,7 +313,7 @@ def test_random_particles_have_no_order():
     assert not np.any(position == other)
 
 
-def test_uniform_gas_reports_its_spread_and_how_far_it_went():
+def test_uniform_report_has_spread_and_displacement():
     problem = Uniform(n=16, velocity=[-3.0, 1.0], domain=[0.0, 2.0])
     particles = particles_of(problem, AIR)
     particles.density = np.linspace(1.0, 1.25, 16)

@@ -383,7 +383,7 @@ def test_a_formulation_without_models(extension):
     text = PART.replace("(Part)", "(Formulation)").replace("scene.physics.mine", "cls")
     text = text.replace("class Mine", "from sph.formulations import Formulation\nclass Mine")
     extension("formulations/mine/__init__.py", text)
-    with pytest.raises(DeclarationError, match=r"Mine: models, starting_models missing"):
+    with pytest.raises(DeclarationError, match=r"Mine: models missing"):
         described('formulation = "mine"')
 
 

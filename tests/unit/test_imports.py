@@ -55,7 +55,7 @@ print(json.dumps(found))
 """
 
 
-def test_modules_import_no_package_before_it_is_needed():
+def test_modules_import_heavy_packages_only_when_needed():
     done = subprocess.run(
         [sys.executable, "-c", PROGRAM], cwd=ROOT, capture_output=True, text=True, timeout=120
     )

@@ -13,7 +13,7 @@ from sph.state import COMMON, Field, State
 MASS = np.array([1.0, 2.0, 3.0, 4.0])
 
 
-def test_energies_take_a_straight_step_where_that_leaves_half():
+def test_energy_update_is_linear_if_half_remains():
     energy, rate, full = np.array([1.0, 2.0]), np.array([-0.5, 3.0]), np.empty(2)
     assert leapfrog.POSITIVE.predict(1.0, energy, rate, MASS[:2], full) == 0.0
     assert full.tolist() == [0.5, 5.0]
@@ -23,7 +23,7 @@ def test_energies_take_a_straight_step_where_that_leaves_half():
 
 
 @pytest.mark.parametrize("cooling", [1.1, 10.0, 1e3, 1e300])
-def test_no_step_takes_all_energy_and_what_that_costs_is_told(cooling):
+def test_energy_update_stays_positive_and_reports_injected_energy(cooling):
     energy, full = np.array([1.0, 0.0, 3.0]), np.empty(3)
     rate = np.array([-2.0 * cooling, -1.0, 1.0])
     straight = energy + 0.5 * rate
@@ -40,7 +40,7 @@ def test_no_step_takes_all_energy_and_what_that_costs_is_told(cooling):
     assert given == pytest.approx(MASS[:3] @ (energy - start - 0.5 * rate), rel=1e-14)
 
 
-def test_the_curve_leaves_the_straight_line_with_its_value_and_slope():
+def test_energy_update_joins_exponential_smoothly():
     change = -0.5 + np.array([-1e-6, 0.0, 1e-6])
     energy = np.ones(3)
     leapfrog.POSITIVE.correct(2.0, energy, change, MASS[:3])
@@ -49,7 +49,7 @@ def test_the_curve_leaves_the_straight_line_with_its_value_and_slope():
     assert energy[1] == 0.5
 
 
-def test_a_number_that_is_none_is_not_hidden():
+def test_energy_update_propagates_nan():
     energy = np.array([np.nan, 1.0, 1.0])
     leapfrog.POSITIVE.correct(1.0, energy, np.array([1.0, np.nan, -np.inf]), MASS[:3])
     assert np.isnan(energy[:2]).all()
@@ -80,11 +80,11 @@ def limit_of(bounds, state, past=None, parts=()):
 ALL = Bounds(0.5, "signal_speed", energy=True, acceleration=True, end=100.0)
 
 
-def test_the_signal_speed_bounds_the_step():
+def test_step_limited_by_signal_speed():
     assert limit_of(ALL, particles()) == (0.1, 8, "signal_speed")
 
 
-def test_heating_bounds_the_step_where_asked():
+def test_step_limited_by_heating_if_enabled():
     rates = np.array([0.0, -10.0])
     limit = limit_of(ALL, particles(energy_rate=rates))
     assert limit == (0.05, 5, "energy")
@@ -93,12 +93,12 @@ def test_heating_bounds_the_step_where_asked():
     assert limit.criterion == "signal_speed"
 
 
-def test_gas_without_any_energy_does_not_stop_the_run():
+def test_step_with_zero_energy_is_finite():
     cold = particles(internal_energy=np.zeros(2), energy_rate=np.array([1.0, 0.0]))
     assert limit_of(ALL, cold) == (0.1, 8, "signal_speed")
 
 
-def test_a_pull_from_outside_bounds_the_step():
+def test_step_limited_by_external_field():
     pulled = particles(acceleration=np.array([[0.0, 2000.0]]))
     # 0.5 sqrt(0.2/2000), two roots and a product of rounding
     assert limit_of(ALL, pulled) == (
@@ -111,7 +111,7 @@ def test_a_pull_from_outside_bounds_the_step():
     assert limit_of(without, pulled).criterion == "signal_speed"
 
 
-def test_a_support_may_not_change_by_more_than_its_part():
+def test_step_limited_by_support_change():
     """It halved in a step of 0.01: at that pace 0.2 of it takes 0.002."""
     past = Past(dt=0.01, limit=1.0)
     halved = particles(support_before=np.array([0.1, 0.4]))
@@ -120,7 +120,7 @@ def test_a_support_may_not_change_by_more_than_its_part():
     assert limit_of(ALL, grown, past).dt == pytest.approx(0.002)
 
 
-def test_gas_that_parts_bounds_the_step():
+def test_step_limited_in_expansion():
     """In 2-D supports grow by div v/2: 0.2 of them takes 0.004."""
     parting = particles(div_v=np.array([100.0, -20.0]))
     limit = limit_of(ALL, parting)
@@ -134,12 +134,12 @@ def test_gas_that_parts_bounds_the_step():
     assert limit_of(ALL, slow, past).criterion == "signal_speed"
 
 
-def test_supports_that_settle_in_a_tiny_step_are_no_reason_for_another():
+def test_step_not_limited_by_support_change_in_tiny_step():
     settled = particles(support_before=np.array([0.1, 0.201]))
     assert limit_of(ALL, settled, Past(dt=1e-9, limit=0.1)).criterion == "signal_speed"
 
 
-def test_a_step_grows_by_its_factor_at_most():
+def test_step_growth_is_limited():
     past = Past(dt=1e-3, limit=1e-3)
     limit = limit_of(ALL, particles(), past)
     assert limit == (pytest.approx(1.5e-3), 0, "growth")
@@ -148,7 +148,7 @@ def test_a_step_grows_by_its_factor_at_most():
     assert limit == (pytest.approx(0.075), 0, "growth")
 
 
-def test_a_step_cut_to_land_on_an_output_does_not_shorten_the_next():
+def test_step_cut_for_output_does_not_shorten_next():
     past = Past(dt=1e-9, limit=0.1)
     assert limit_of(ALL, particles(), past).dt == 0.1
 
@@ -163,22 +163,20 @@ def test_a_step_cut_to_land_on_an_output_does_not_shorten_the_next():
         ({"support_before": np.full(2, 0.2)}, Past(dt=0.01, limit=1.0), "support"),
     ],
 )
-def test_of_particles_alike_the_lower_id_sets_the_step(alike, past, criterion):
+def test_step_limit_tie_names_lowest_id(alike, past, criterion):
     """Memory order must not show: it changes with the lists."""
     both = particles(**{"support": np.full(2, 0.1), "support_before": np.full(2, 0.1)} | alike)
     limit = limit_of(ALL, both, past)
     assert (limit.particle, limit.criterion) == (5, criterion)
 
 
-def test_gas_in_which_nothing_moves_takes_one_step():
+def test_gas_at_rest_without_pressure_takes_one_step():
     still = particles(internal_energy=np.zeros(2), signal_speed=np.zeros(2))
     assert limit_of(ALL, still) == (100.0, 0, "end")
 
 
 class Strict(Part):
     """Bounds the step of each particle by itself."""
-
-    name = "strict"
 
     def __init__(self, *times):
         self.times = np.array(times)
@@ -187,12 +185,12 @@ class Strict(Part):
         return self.times
 
 
-def test_a_part_may_bound_the_step_of_each_particle():
+def test_step_limited_by_part():
     others = (Part(), Strict(0.3, 0.4))
     assert limit_of(ALL, particles(), parts=others) == (0.1, 8, "signal_speed")
     # not times the Courant number; of two alike the lower ID
-    assert limit_of(ALL, particles(), parts=(*others, Strict(0.09, 0.02))) == (0.02, 5, "strict")
-    assert limit_of(ALL, particles(), parts=(Strict(0.02, 0.02),)) == (0.02, 5, "strict")
+    assert limit_of(ALL, particles(), parts=(*others, Strict(0.09, 0.02))) == (0.02, 5, Strict.name)
+    assert limit_of(ALL, particles(), parts=(Strict(0.02, 0.02),)) == (0.02, 5, Strict.name)
     # of a part's bound as of every other, what supports and growth allow is less
     past = Past(dt=1e-3, limit=1e-3)
     assert limit_of(ALL, particles(), past, (Strict(0.02, 0.02),)).criterion == "growth"
@@ -220,7 +218,7 @@ def growth(damping, frequency, dt=1.0):
 
 
 @pytest.mark.parametrize("damping", [0.0, 0.05, 0.3, 0.7, 0.95])
-def test_the_leapfrog_is_stable_as_far_as_the_formula_says(damping):
+def test_leapfrog_stable_up_to_formula(damping):
     """lambda dt + (w dt)^2/4 < 1; eigenvalues of 1 in size are good to the root of rounding."""
     for inside in (0.01, 0.5, 0.99):
         assert growth(damping, 2 * np.sqrt(inside * (1 - damping))) < 1 + 1e-7
@@ -247,7 +245,7 @@ def bounds_of(**physics):
         (0.15, 1e200, 5e-201, "viscosity"),  # whose square is beyond the largest number
     ],
 )
-def test_damping_holds_the_courant_number(C, alpha, held, criterion):
+def test_courant_number_limited_by_viscosity(C, alpha, held, criterion):
     bounds = bounds_of(C=C, alpha=alpha)
     assert (bounds.courant, bounds.criterion) == (pytest.approx(held, rel=1e-6), criterion)
     if held < C:
@@ -258,13 +256,13 @@ def test_damping_holds_the_courant_number(C, alpha, held, criterion):
     assert limit == (pytest.approx(0.2 * held, rel=1e-6), 8, criterion)
 
 
-def test_what_a_switch_may_rise_to_holds_the_courant_number():
+def test_courant_number_limited_by_maximum_of_switch():
     switched = bounds_of(alpha="{ min = 0.1, max = 8.0 }")
     assert switched == bounds_of(alpha=8.0)
     assert switched != bounds_of(alpha=0.1)
 
 
-def test_strong_conductivity_holds_the_courant_number():
+def test_courant_number_limited_by_conductivity():
     strong = bounds_of(C=0.15, conductivity="{ name = 'approach', strength = 30.0 }")
     limit = limit_of(strong, particles())
     assert limit == (pytest.approx(0.2 * 0.05), 8, "conductivity")
@@ -281,7 +279,7 @@ def test_strong_conductivity_holds_the_courant_number():
 # --- what evolves -----------------------------------------------------------------------------
 
 
-def test_every_evolved_field_moves_by_its_rule():
+def test_evolved_fields_move_by_their_rules():
     """Half a step in place, a full one into the prediction, for scalars and tensors alike."""
     names = ("scalar", "tensor")
     fields = [Field(f"{name}{of}", rank) for name, rank in zip(names, (0, 2), strict=True)

@@ -38,13 +38,13 @@ def quadrature():
     return ((nodes + 1) / 2 + sixth).ravel() / 6, np.tile(weights, 6) / 12
 
 
-def test_folder_has_the_common_kernels():
+def test_common_kernels_are_available():
     assert {"wendland_c2", "cubic_spline"} <= set(registry.names("sph.kernels"))
 
 
 @every_kernel
 @every_dimension
-def test_integral_over_space_is_one(kernel, dimension):
+def test_kernel_integral_is_one(kernel, dimension):
     q, weight = quadrature()
     dim = (0,) * dimension
     shells = SPHERE[dimension] * q ** (dimension - 1)
@@ -55,7 +55,7 @@ def test_integral_over_space_is_one(kernel, dimension):
 
 @every_kernel
 @every_dimension
-def test_slope_is_that_of_the_kernel(kernel, dimension):
+def test_slope_equals_derivative_of_kernel(kernel, dimension):
     dim, step = (0,) * dimension, 1e-6
     q = np.linspace(0.01, 1.1, 110) + 0.001  # off the joints of the pieces
     difference = (kernel.w(dim, q + step) - kernel.w(dim, q - step)) / (2 * step)
@@ -65,7 +65,7 @@ def test_slope_is_that_of_the_kernel(kernel, dimension):
 
 @every_kernel
 @every_dimension
-def test_support_is_compact_and_slope_never_positive(kernel, dimension):
+def test_kernel_support_compact_and_slope_not_positive(kernel, dimension):
     dim = (0,) * dimension
     inside = np.append(1e-150, np.linspace(1e-3, 0.999, 1000))  # the passes keep r off zero
     beyond = np.array([1.0, 1.001, 2.0, 1e6])
@@ -79,7 +79,7 @@ def test_support_is_compact_and_slope_never_positive(kernel, dimension):
 
 @every_kernel
 @every_dimension
-def test_force_takes_the_kernels_slope_unless_flattened(kernel, dimension):
+def test_force_slope_equals_kernel_slope_unless_flattened(kernel, dimension):
     dim = (0,) * dimension
     flat = getattr(kernel, "flattened", False)
     q = np.linspace(1 / 3 + 1e-9 if flat else 0.001, 1.2, 100)
@@ -88,7 +88,7 @@ def test_force_takes_the_kernels_slope_unless_flattened(kernel, dimension):
 
 
 @every_dimension
-def test_flattened_slope_stays_at_its_value_of_one_third(dimension):
+def test_flattened_slope_constant_within_one_third(dimension):
     kernel, dim = kernels.make("cubic_spline", flattened=True), (0,) * dimension
     at_third = kernels.make("cubic_spline").dw_over_q(dim, np.array(1 / 3)) / 3
     q = np.array([1e-150, 1e-8, 0.1, 0.3, 1 / 3 - 1e-12, 1 / 3 + 1e-12])
@@ -98,7 +98,7 @@ def test_flattened_slope_stays_at_its_value_of_one_third(dimension):
 
 
 @every_dimension
-def test_wendland_c2_is_that_of_eqs_11_to_14(dimension):
+def test_wendland_c2_matches_eqs_11_to_14(dimension):
     kernel, dim, q = kernels.make("wendland_c2"), (0,) * dimension, np.linspace(0.001, 1, 50)
     C = {1: 5 / 4, 2: 7 / math.pi, 3: 21 / (2 * math.pi)}[dimension]
     if dimension == 1:
@@ -112,7 +112,7 @@ def test_wendland_c2_is_that_of_eqs_11_to_14(dimension):
 
 
 @every_dimension
-def test_cubic_spline_is_that_of_eqs_115_and_116(dimension):
+def test_cubic_spline_matches_eqs_115_and_116(dimension):
     kernel, dim, q = kernels.make("cubic_spline"), (0,) * dimension, np.linspace(0.001, 1, 50)
     C = {1: 4 / 3, 2: 40 / (7 * math.pi), 3: 8 / math.pi}[dimension]
     inner = q < 0.5
@@ -130,14 +130,14 @@ def test_cubic_spline_is_that_of_eqs_115_and_116(dimension):
         ("cubic_spline", (1.732051, 1.778002, 1.825742)),
     ],
 )
-def test_support_over_smoothing_length_is_the_known_one(name, printed):
+def test_support_over_smoothing_length_matches_known_values(name, printed):
     found = [kernels.support_ratio(kernels.make(name), dimension) for dimension in DIMENSIONS]
     np.testing.assert_allclose(found, printed, rtol=0, atol=5e-7)  # half a unit of the last digit
 
 
 @every_kernel
 @every_dimension
-def test_support_over_smoothing_length_follows_from_the_kernel(kernel, dimension):
+def test_support_over_smoothing_length_follows_from_kernel(kernel, dimension):
     q, weight = quadrature()
     shells = weight * q ** (dimension - 1) * kernel.w((0,) * dimension, q)
     deviation = np.sqrt(np.sum(shells * q**2) / np.sum(shells) / dimension)
@@ -156,7 +156,7 @@ def _compiled(kernel, dim, q):
 
 
 @every_kernel
-def test_compiled_code_finds_the_same_numbers(kernel):
+def test_compiled_kernels_equal_python(kernel):
     dim = (0, 0)
     for q in (0.0, 0.2, 0.4, 0.6, 0.999, 1.0, 3.0):
         with_numpy = (
@@ -168,6 +168,6 @@ def test_compiled_code_finds_the_same_numbers(kernel):
         np.testing.assert_allclose(found, with_numpy, rtol=1e-14, atol=1e-14)
 
 
-def test_a_kernel_that_does_not_exist_is_named():
+def test_unknown_kernel_is_named():
     with pytest.raises(KeyError, match=r"gauss.*cubic_spline.*wendland_c2"):
         kernels.make("gauss")

@@ -40,7 +40,7 @@ def nearest_distance(position, box):
 
 
 @pytest.mark.parametrize(("kind", "dimension"), NEAREST)
-def test_number_is_near_the_one_asked_for(kind, dimension):
+def test_fill_number_near_requested(kind, dimension):
     for n in (700, 1000, 1331, 5000):
         found = lattice.fill(long_box(dimension), n, kind).shape
         assert found[0] == dimension
@@ -50,7 +50,7 @@ def test_number_is_near_the_one_asked_for(kind, dimension):
 
 
 @pytest.mark.parametrize(("kind", "dimension"), KINDS)
-def test_no_particle_lies_on_a_face(kind, dimension):
+def test_fill_no_particle_on_face(kind, dimension):
     box = long_box(dimension)
     position = lattice.fill(box, 1000, kind)
     assert np.all(position > box[:, :1])
@@ -58,7 +58,7 @@ def test_no_particle_lies_on_a_face(kind, dimension):
 
 
 @pytest.mark.parametrize(("kind", "dimension"), NEAREST)
-def test_nearest_neighbours_of_a_cube_are_those_of_the_lattice(kind, dimension):
+def test_fill_cube_has_lattice_neighbours(kind, dimension):
     # In a cube whose side is whole cells of any of these, but for the sqrt(3) of the hexagons,
     # which 15 x 26 cells take to 4e-4 of sqrt(3); the rest is round-off.
     n = {"hexagonal": 2 * 26 * 15, "bcc": 2 * 7**3}.get(kind, 10**dimension)
@@ -72,7 +72,7 @@ def test_nearest_neighbours_of_a_cube_are_those_of_the_lattice(kind, dimension):
 
 
 @pytest.mark.parametrize(("kind", "dimension"), [one for one in KINDS if one[0] != "relaxed"])
-def test_box_is_filled_evenly_across_its_faces(kind, dimension):
+def test_fill_is_even_across_faces(kind, dimension):
     """Structure factors vanish at all long waves of the box: no gap and no overlap anywhere."""
     box = long_box(dimension)
     position = lattice.fill(box, 1500, kind)
@@ -84,14 +84,14 @@ def test_box_is_filled_evenly_across_its_faces(kind, dimension):
             assert abs(total) < 1e-12 * position.shape[1]
 
 
-def test_axes_of_equal_length_get_equal_numbers():
+def test_fill_equal_axes_get_equal_numbers():
     cube = np.array([[0.0, 1.0]] * 3)
     for n in (9, 100, 31000, 32768, 33000):
         assert len(set(lattice.whole_cells(cube, n, (1.0, 1.0, 1.0)))) == 1
     assert lattice.whole_cells(cube, 32768, (1.0, 1.0, 1.0)) == (32, 32, 32)
 
 
-def test_even_lattice_is_the_same_seen_from_its_centre_along_every_axis():
+def test_even_lattice_symmetric_about_centre():
     for dimension, n in ((1, 101), (2, 121), (3, 1331)):
         box = np.array([[-0.5, 0.5]] * dimension)
         position = lattice.fill(box, n, "cubic", even=True)
@@ -101,7 +101,7 @@ def test_even_lattice_is_the_same_seen_from_its_centre_along_every_axis():
         assert np.abs(position).min() == pytest.approx(0.5 / per_axis, abs=1e-15)
 
 
-def test_stacks_on_either_side_continue_one_another():
+def test_adjacent_stacks_continue_lattice():
     cell = lattice.unit_cell("bcc", 3)
     across = [[0.0, 1.0], [0.0, 1.0]]
     left = lattice.stack(cell, range(-6, 0), 0.5, 0.1, across, (4, 4))
@@ -110,7 +110,7 @@ def test_stacks_on_either_side_continue_one_another():
     np.testing.assert_allclose(np.hstack([left, right]), whole, atol=1e-15)  # round-off
 
 
-def test_lattice_of_another_dimension_is_refused_with_what_to_take():
+def test_lattice_for_other_dimension_is_refused_with_alternative():
     for kind, dimension in (("hexagonal", 3), ("hexagonal", 1), ("bcc", 2), ("bcc", 1)):
         with pytest.raises(ValueError, match=r'expected "cubic"'):
             lattice.fill(np.array([[0.0, 1.0]] * dimension), 100, kind)
@@ -119,7 +119,7 @@ def test_lattice_of_another_dimension_is_refused_with_what_to_take():
 
 
 @pytest.mark.parametrize(("dimension", "nearest"), [(1, 0.95), (2, 0.8), (3, 0.8)])
-def test_glass_keeps_particles_apart_without_being_a_lattice(dimension, nearest):
+def test_glass_separates_particles_without_lattice(dimension, nearest):
     # 0.98, 0.89 and 0.86 were measured at this size, 0.05 to 0.1 before relaxing; a lattice
     # would show no scatter at all, the glass 0.8, 2.9 and 2.9 %.
     box = long_box(dimension)
@@ -128,7 +128,7 @@ def test_glass_keeps_particles_apart_without_being_a_lattice(dimension, nearest)
     assert distance.std() > (0.001, 0.01, 0.01)[dimension - 1]
 
 
-def test_glass_and_noise_follow_their_seed():
+def test_glass_and_noise_reproducible_from_seed():
     box = long_box(2)
     for draw in (
         lambda seed: lattice.fill(box, 100, "relaxed", seed),
@@ -138,7 +138,7 @@ def test_glass_and_noise_follow_their_seed():
         assert not np.allclose(draw(1), draw(2))
 
 
-def test_noise_moves_by_its_fraction_of_the_spacing_and_stays_inside():
+def test_noise_moves_by_fraction_of_spacing_inside_box():
     box = long_box(3)
     before = lattice.fill(box, 3000, "bcc")
     after = lattice.with_noise(before, box, 0.5, seed=3)

@@ -20,7 +20,8 @@ def found_by_pass(search, position, support, mass, density, threads=1):
     )
     ratio = np.full(support.size, np.nan)
     team = EagerTeam(threads)
-    team.run(nearest, search.lists.start.size, dim, lists, position, support, mass, density, ratio)
+    fields = (position, support, mass, density, ratio)
+    team.run(nearest, search.lists.start.size, dim, None, lists, *fields)
     team.close()
     return ratio
 
@@ -44,7 +45,7 @@ def found_densely(domain, position, support, mass, density):
      ("periodic",) * 3, MIXED],
     ids="-".join,
 )  # fmt: skip
-def test_it_is_the_smallest_of_all_distances(boundaries, shape, threads):
+def test_nearest_distance_is_minimum_over_all_pairs(boundaries, shape, threads):
     position = positions(shape, len(boundaries), 203)
     random = np.random.default_rng(7)
     # so small that some particles have no neighbour within, so large that images come within
@@ -62,7 +63,7 @@ def test_it_is_the_smallest_of_all_distances(boundaries, shape, threads):
         assert np.count_nonzero(expected == 0.0) > 50  # several in one place
 
 
-def test_images_count_also_those_of_the_particle_itself():
+def test_nearest_distance_includes_own_images():
     position = np.array([[0.001, 0.5, 0.999]])
     gas = (position, np.full(3, 0.4), np.ones(3), np.ones(3))
     for boundary, near in (("mirror", 0.002), ("periodic", 0.002), ("open", np.inf)):
@@ -71,7 +72,7 @@ def test_images_count_also_those_of_the_particle_itself():
         np.testing.assert_allclose(ends, near, rtol=1e-10)
 
 
-def test_threads_give_the_bits_of_one():
+def test_nearest_distance_two_threads_equal_one():
     position = positions("clustered", 3, 3000)
     support = np.full(3000, 0.05)
     search, order = search_over(MIXED, position, support, 0.2)
@@ -96,16 +97,14 @@ def after(simulation, time):
 
 
 @pytest.mark.parametrize(("kernel", "pairs"), [("cubic_spline", True), ("wendland_c2", False)])
-def test_pairs_of_a_kernel_that_pulls_particles_together_are_told(
-    simulate, tmp_path, kernel, pairs
-):
+def test_pairing_kernel_is_reported(simulate, tmp_path, kernel, pairs):
     keys = (f"physics.kernel={kernel}", "physics.eta=2.2", "physics.allow_pairing=true")
     run = after(simulate(uniform(tmp_path, *keys)), 5.0)
     # medians of .05 and .97 were measured
     assert (np.median(run.nearest()) < PAIRED) == pairs
 
 
-def test_distances_at_the_start_are_those_of_the_lattice(simulate, tmp_path):
+def test_nearest_distance_at_start_equals_lattice(simulate, tmp_path):
     run = simulate(uniform(tmp_path, "problem.noise=0.0"))
     # the density of the lattice is 0.5 % too high, and with it the spacing 0.25 % too small
     np.testing.assert_allclose(run.nearest(), np.sqrt(run.particles.density), rtol=1e-12)

@@ -94,7 +94,7 @@ def missing(search, position, support):
 
 @pytest.mark.parametrize("shape", SHAPES)
 @pytest.mark.parametrize("dimension", [1, 2, 3])
-def test_order_depends_on_positions_and_ids_alone(shape, dimension):
+def test_order_depends_only_on_positions_and_ids(shape, dimension):
     position = positions(shape, dimension, 203)
     identity = np.random.default_rng(3).permutation(203)
     team = EagerTeam(1)
@@ -107,7 +107,7 @@ def test_order_depends_on_positions_and_ids_alone(shape, dimension):
 
 @pytest.mark.parametrize("shape", ["random", "equal_coordinates"])
 @pytest.mark.parametrize("threads", [2, 3])
-def test_order_and_lists_do_not_depend_on_threads(shape, threads, monkeypatch):
+def test_order_and_lists_independent_of_threads(shape, threads, monkeypatch):
     monkeypatch.setattr(order, "SMALLEST_RANGE", 0)
     position = positions(shape, 2, 1500)  # more chunks of blocks than threads
     np.testing.assert_array_equal(ordered(position, threads), ordered(position))
@@ -123,7 +123,7 @@ def test_order_and_lists_do_not_depend_on_threads(shape, threads, monkeypatch):
 
 
 @pytest.mark.parametrize("count", [2, 7, 8, 9, 16, 17, 31, 64, 65, 100])
-def test_blocks_are_full_compact_and_split_at_the_median(count):
+def test_blocks_full_compact_and_split_at_median(count):
     position = positions("random", 1, count)
     in_order = position[0, ordered(position)]
     # in 1-D a split at the median leaves every block to the right of the one before
@@ -134,7 +134,7 @@ def test_blocks_are_full_compact_and_split_at_the_median(count):
         assert left.max() < right.min()
 
 
-def test_the_longest_axis_is_split():
+def test_order_splits_longest_axis():
     position = positions("random", 3, 16) * np.array([[1.0], [9.0], [1.0]])
     y = position[1, ordered(position)]
     assert y[:BLOCK].max() < y[BLOCK:].min()
@@ -145,7 +145,7 @@ def test_the_longest_axis_is_split():
 
 @pytest.mark.parametrize("boundaries", BOUNDARIES, ids=str)
 @pytest.mark.parametrize("shape", SHAPES)
-def test_lists_hold_all_within_the_larger_support(shape, boundaries):
+def test_lists_contain_all_within_larger_support(shape, boundaries):
     d = len(boundaries)
     position, support = positions(shape, d, 203), supports(d, 203)
     search, new = search_over(boundaries, position, support, 0.0)
@@ -154,13 +154,13 @@ def test_lists_hold_all_within_the_larger_support(shape, boundaries):
 
 
 @pytest.mark.parametrize("count", [*range(2, 20), 63, 64, 65, 100])
-def test_lists_of_few_particles(count):
+def test_lists_few_particles_complete(count):
     position, support = positions("random", 2, count), supports(2, count)
     search, new = search_over(("periodic", "mirror"), position, support, 0.1)
     assert missing(search, position[:, new], 1.1 * support[new]) == 0
 
 
-def test_lists_do_not_hold_what_is_out_of_reach():
+def test_lists_exclude_particles_out_of_reach():
     position, support = positions("random", 2, 203), supports(2, 203)
     search, new = search_over(("open", "periodic"), position, support, 0.1)
     x, largest = (
@@ -177,7 +177,7 @@ def test_lists_do_not_hold_what_is_out_of_reach():
 
 @pytest.mark.parametrize("boundaries", BOUNDARIES, ids=str)
 @pytest.mark.parametrize("seed", range(4))
-def test_lists_call_themselves_stale_before_they_miss_a_pair(boundaries, seed):
+def test_lists_stale_before_missing_a_pair(boundaries, seed):
     """Random motion, step by step: as long as the lists are trusted they are complete."""
     random = np.random.default_rng(seed)
     d, count = len(boundaries), 120
@@ -209,7 +209,7 @@ def test_lists_call_themselves_stale_before_they_miss_a_pair(boundaries, seed):
         (0.11, 0.9, True),
     ],
 )
-def test_lists_are_trusted_until_the_skin_is_used_up(moves, growth, trusted):
+def test_lists_valid_until_skin_used_up(moves, growth, trusted):
     position = np.array([[0.2, 0.8]])
     search, _ = search_over(("open",), position, np.array([0.1, 0.1]), 0.2)
     moved = position + np.array([[moves * 0.1, 0.0]])
@@ -217,7 +217,7 @@ def test_lists_are_trusted_until_the_skin_is_used_up(moves, growth, trusted):
     assert search.stale(moved, grown) != trusted
 
 
-def test_two_particles_that_approach_are_stale_before_they_meet():
+def test_lists_two_approaching_particles_stale_before_contact():
     # listed within 0.12; from 0.1201 apart, each goes towards the other
     position, H = np.array([[0.4, 0.5201]]), np.array([0.1, 0.1])
     far = np.linspace(2, 9, 15)[None]  # company, so that the two are in blocks of their own
@@ -237,13 +237,13 @@ def test_two_particles_that_approach_are_stale_before_they_meet():
     assert meet  # the motion did bring them together
 
 
-def test_a_search_without_lists_is_stale():
+def test_search_without_lists_is_stale():
     search = Search(Domain(np.array([[0.0, 1.0]]), ("open",)), Team(1))
     assert search.stale(np.zeros((1, 3)), np.ones(3))
 
 
 @pytest.mark.parametrize("boundaries", BOUNDARIES, ids=str)
-def test_widening_lists_the_asking_blocks_further_and_the_others_no_less(boundaries):
+def test_widening_extends_requesting_blocks_and_keeps_others(boundaries):
     d = len(boundaries)
     position, support = positions("random", d, 100), supports(d, 100) / 2
     search, new = search_over(boundaries, position, support, 0.1)
@@ -259,7 +259,7 @@ def test_widening_lists_the_asking_blocks_further_and_the_others_no_less(boundar
 
 @pytest.mark.parametrize("skin", [0.01, 1.0])
 @pytest.mark.parametrize("boundary", ["periodic", "mirror"])
-def test_lists_serve_supports_wider_than_the_box(boundary, skin):
+def test_lists_supports_wider_than_box_complete(boundary, skin):
     """However wide their skin is: 0.95 of the box was refused where 0.95 (1 + skin) was more."""
     position, support = positions("random", 2, 50), np.full(50, 0.95)
     support[:10] = 3.2
@@ -267,7 +267,7 @@ def test_lists_serve_supports_wider_than_the_box(boundary, skin):
     assert missing(search, position[:, new], support[new]) == 0
 
 
-def test_supports_and_numbers_that_cannot_be_served_are_refused(monkeypatch):
+def test_unsupported_supports_and_counts_are_refused(monkeypatch):
     position = positions("random", 1, 10)
     with pytest.raises(NumericalError, match="600 times the shortest side of the box"):
         search_over(("periodic",), position, np.full(10, 600.0), 0.1)
@@ -277,7 +277,7 @@ def test_supports_and_numbers_that_cannot_be_served_are_refused(monkeypatch):
         search.order(position, np.arange(10))
 
 
-def test_lists_built_again_are_the_same_whatever_room_was_left():
+def test_lists_rebuilt_equal_for_any_capacity():
     position, support = positions("random", 2, 700), supports(2, 700) / 4
     search, _ = search_over(("periodic", "mirror"), position, support, 0.1)
     first = listed(search)
@@ -303,7 +303,7 @@ def test_lists_are_built_again_where_any_chunk_has_too_little_room():
 
 
 @pytest.mark.parametrize("dimension", [1, 2, 3])
-def test_skin_falls_short_of_no_step_and_grows_with_it_until_it_does_not_pay(dimension):
+def test_skin_covers_step_and_grows_while_worthwhile(dimension):
     assert best_skin(0.0, dimension) == GROWTH  # lists for ever need only the room for growth
     for step in (1e-4, 1e-3, 1e-2):
         kept = (best_skin(step, dimension) - GROWTH) / (2 * step) + 1
@@ -338,7 +338,7 @@ def arranged(shape, dimension, count, random):
     [(shape, d) for shape in ("noise", "concentration") for d in (1, 2, 3)]
     + [("sheet", 2), ("sheet", 3), ("filament", 3)],
 )
-def test_first_guess_is_near_the_support_it_leads_to(shape, dimension):
+def test_first_guess_near_converged_support(shape, dimension):
     position = arranged(shape, dimension, 300, np.random.default_rng(7))
     position = np.ascontiguousarray(position[:, ordered(position)])
     count = position.shape[1]
@@ -354,12 +354,12 @@ def test_first_guess_is_near_the_support_it_leads_to(shape, dimension):
 
 @pytest.mark.parametrize("count", [2, 3, 8, 9, 33])
 @pytest.mark.parametrize("shape", ["random", "line", "plane"])
-def test_first_guess_of_few_particles_is_finite_and_positive(shape, count):
+def test_first_guess_few_particles_finite_and_positive(shape, count):
     guess = first_guess.from_spacing(positions(shape, 3, count), 2.5)
     assert np.all(np.isfinite(guess) & (guess > 0))
 
 
-def test_first_guess_where_a_block_lies_in_one_place_is_positive():
+def test_first_guess_coincident_block_is_positive():
     position = positions("random", 3, 100)
     position[:, : 2 * BLOCK] = 0.5
     guess = first_guess.from_spacing(np.ascontiguousarray(position[:, ordered(position)]), 2.5)
@@ -374,7 +374,7 @@ def held(position, radius):
 
 @pytest.mark.parametrize("dimension", [1, 2, 3])
 @pytest.mark.parametrize("factor", [0.1, 1.0, 100.0, 1e6])
-def test_a_guess_that_holds_far_too_many_is_trimmed_and_others_are_left(dimension, factor):
+def test_trim_reduces_only_far_too_large_guesses(dimension, factor):
     position = positions("random", dimension, 3000)
     position = np.ascontiguousarray(position[:, ordered(position)])
     ratio = 2.5  # spacings to a support
@@ -393,7 +393,7 @@ def test_a_guess_that_holds_far_too_many_is_trimmed_and_others_are_left(dimensio
     assert held(position, 2 * guess).min() > first_guess.TOO_MANY * wanted / 8
 
 
-def test_trimming_ends_where_particles_are_in_one_place():
+def test_trim_coincident_particles_terminates():
     guess = np.ones(100)
     first_guess.trim(np.full((3, 100), 0.5), 0.5, 1e-3, guess)
     assert 1e-3 < guess.max() <= 2e-3

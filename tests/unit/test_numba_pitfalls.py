@@ -137,7 +137,7 @@ def test_passes_are_cached_across_processes(first_steps):
 
 
 @pytest.mark.slow
-def test_code_just_compiled_and_code_from_the_cache_give_the_same_bits(first_steps):
+def test_compiled_and_cached_code_give_equal_bits(first_steps):
     """A callee that is not inlined is compiled twice: on its own, and within its caller.
 
     The process that compiles them calls the one, a process that loads the caller from the cache
@@ -148,7 +148,7 @@ def test_code_just_compiled_and_code_from_the_cache_give_the_same_bits(first_ste
         assert array == second["arrays"][name], name
 
 
-def test_cache_directory_is_the_one_asked_for(tmp_path):
+def test_cache_directory_follows_environment_variable(tmp_path):
     (tmp_path / "caller.py").write_text(CALLER)
     paths = {"PYTHONPATH": PACKAGE.parent, "NUMBA_CACHE_DIR": tmp_path / "mine"}
     directory = Path(in_new_process(CALL, tmp_path, **paths)["directory"])
@@ -160,7 +160,7 @@ def test_cache_directory_is_the_one_asked_for(tmp_path):
 
 @pytest.mark.slow
 @pytest.mark.skipif(os.name != "posix", reason="the user's cache directory is moved by HOME")
-def test_an_edit_to_a_function_that_is_called_is_seen(tmp_path):
+def test_edit_of_called_function_is_recompiled(tmp_path):
     copy = tmp_path / "sph"
     shutil.copytree(PACKAGE, copy, ignore=shutil.ignore_patterns("__pycache__"))
     (tmp_path / "caller.py").write_text(CALLER)
@@ -178,7 +178,7 @@ def test_an_edit_to_a_function_that_is_called_is_seen(tmp_path):
     assert after["directory"] != before["directory"]
 
 
-def test_the_hash_of_the_sources_sees_contents_and_names(tmp_path, monkeypatch):
+def test_source_hash_depends_on_contents_and_names(tmp_path, monkeypatch):
     monkeypatch.setattr(sph, "__file__", str(tmp_path / "__init__.py"))
     (tmp_path / "part").mkdir()
     one, other = tmp_path / "part" / "one.py", tmp_path / "part" / "other.py"
@@ -242,7 +242,7 @@ def _call(model, x):
     return twice_or_half(model, x)
 
 
-def test_a_verb_is_that_of_its_model():
+def test_verb_resolves_to_method_of_model():
     assert _call(Twice(2.0), 3.0) == Twice(2.0).twice_or_half(3.0) == 6.0
     assert _call(Half(2.0), 3.0) == 1.5
     assert len(_call.signatures) == 2
@@ -250,7 +250,7 @@ def test_a_verb_is_that_of_its_model():
     assert len(_call.signatures) == 2
 
 
-def test_no_two_models_look_alike_to_the_dispatcher():
+def test_models_are_distinct_to_dispatcher():
     """From Python, Numba tells named tuples apart by class name and fields' types, not by class.
 
     A second class of that name with the fields of the first would silently run with its formulas,
@@ -275,7 +275,7 @@ def _with_extra(x, extra):
     return x
 
 
-def test_a_branch_on_an_argument_that_is_none_is_left_out():
+def test_branch_on_none_argument_is_pruned():
     # had it been compiled, the field that does not exist would be an error
     assert _with_extra(1.0, None) == 1.0
 
@@ -288,7 +288,7 @@ def _seen_as_strange(x):
     return np.isnan(x), np.isinf(x), x != x, x < np.inf
 
 
-def test_non_finite_numbers_are_still_seen():
+def test_non_finite_numbers_detected_in_compiled_code():
     assert {"nnan", "ninf", "fast"}.isdisjoint(FASTMATH)
     assert _seen_as_strange(np.nan) == (True, False, True, False)
     assert _seen_as_strange(np.inf) == (False, True, False, False)
@@ -315,7 +315,7 @@ def packed_instructions(function, name):
     return sum(name in line and ("%ymm" in line or "%zmm" in line) for line in text.splitlines())
 
 
-def test_larger_and_smaller_find_the_extremes():
+def test_larger_and_smaller_give_extremes():
     x = np.random.default_rng(1).normal(size=1003)
     assert _extremes(x) == (x.max(), x.min())
     np.testing.assert_array_equal(larger(x, 0 * x), np.maximum(x, 0))

@@ -42,7 +42,7 @@ def row(code, n, cpu, error, case="Tube", failure=None):
 OURS = [row("sph", 50, 1.0, 1.0), row("sph", 100, 4.0, 0.25), row("sph", 200, 16.0, 0.0625)]
 
 
-def test_cost_between_runs_follows_their_power_law(report):
+def test_cost_between_runs_follows_power_law(report):
     seconds, known = report.cost_at(OURS, 0.2, "density")
     assert (seconds, known) == (pytest.approx(5.0, rel=1e-12), "equal")
     assert report.cost_at(OURS[::-1], 0.0625, "density") == (
@@ -51,17 +51,17 @@ def test_cost_between_runs_follows_their_power_law(report):
     )
 
 
-def test_cost_beyond_our_runs(report):
+def test_cost_outside_our_runs_is_a_bound(report):
     assert report.cost_at(OURS, 2.0, "density") == (1.0, "less")
     assert report.cost_at(OURS, 0.01, "density") == (0.0, "more")
 
 
-def test_ratios_are_theirs_over_ours(report):
+def test_ratio_is_other_code_over_ours(report):
     assert report.ratio_to(row("PySPH a", 50, 60.0, 0.2), OURS, "density")[0] == pytest.approx(12.0)
     assert report.ratio_to(row("PySPH a", 50, 60.0, 0.01), OURS, "density") == (0.0, "more")
 
 
-def test_the_verdict_says_where_the_aim_is_met_and_where_not(report):
+def test_verdict_states_where_aim_is_met(report):
     theirs = [
         row("PySPH a", 60, 60.0, 0.2),
         row("PySPH a", 30, 30.0, 5.0),
@@ -88,11 +88,11 @@ def test_the_verdict_says_where_the_aim_is_met_and_where_not(report):
     ]
 
 
-def test_no_verdict_without_the_other_code(report):
+def test_verdict_without_other_code_is_missing(report):
     assert report.verdict(OURS) == ""
 
 
-def test_a_line_of_the_table(report):
+def test_table_line_has_figures(report):
     found = row("PySPH a", 60, 1.5, 0.2) | {"energy_ratio": 1.001}
     assert report.line(found) == (
         "| Tube | PySPH a | 60 | 7 | 1.50 | 2.5 | 0.2 | 0.2 | 0.2 | +1.0e-03 |"
@@ -112,7 +112,7 @@ def test_table_and_picture_are_written(report, tmp_path):
 # --- the grid that judges the shear layer -----------------------------------------------------
 
 
-def test_values_between_cells_are_bilinear_and_periodic(grid):
+def test_grid_values_between_cells_bilinear_and_periodic(grid):
     n = 8
     x = (np.arange(n) + 0.5) / n
     field = np.add.outer(x, 3.0 * x)
@@ -124,7 +124,7 @@ def test_values_between_cells_are_bilinear_and_periodic(grid):
     assert seam[0] == pytest.approx(0.5 * (x[0] + x[-1]) + 3.0 * x[2], rel=1e-14)
 
 
-def test_grid_conserves_and_leaves_uniform_flow_alone(grid):
+def test_grid_conserves_and_keeps_uniform_flow(grid):
     state = np.ones((4, 8, 8)) * np.array([2.0, 0.3, -0.4, 1.5])[:, None, None]
     np.testing.assert_allclose(grid.solve(state, 1.4, 0.1), state, rtol=1e-13)
     state[0] += np.random.default_rng(1).random((8, 8))
@@ -135,7 +135,7 @@ def test_grid_conserves_and_leaves_uniform_flow_alone(grid):
 
 
 @pytest.mark.parametrize("axis", [0, 1])
-def test_grid_carries_a_wave_of_density_at_second_order(grid, axis):
+def test_grid_advects_density_wave_at_second_order(grid, axis):
     def error(n):
         x = (np.arange(n) + 0.5) / n
         along = x[:, None] if axis == 0 else x[None, :]
@@ -152,7 +152,7 @@ def test_grid_carries_a_wave_of_density_at_second_order(grid, axis):
 # --- the cases --------------------------------------------------------------------------------
 
 
-def test_every_case_is_a_valid_configuration_with_settings_for_all_sizes(peers):
+def test_every_case_has_valid_configuration_for_all_sizes(peers):
     for case in peers.CASES.values():
         for n in case.sizes:
             config = peers.config_of(case, n)
@@ -174,7 +174,7 @@ def test_energy_is_kinetic_and_internal(peers):
     assert peers.energy(state) == 0.5 * 25.0 + 0.5 + 1.0 + 4.0
 
 
-def test_what_became_of_a_process(peers, monkeypatch):
+def test_timed_reports_how_process_ended(peers, monkeypatch):
     python = sys.executable
     assert peers.timed([python, "-c", "pass"])[1] is None
     assert peers.timed([python, "-c", "raise SystemExit('no such thing')"])[1] == "no such thing"
@@ -184,6 +184,6 @@ def test_what_became_of_a_process(peers, monkeypatch):
     assert "not ended" in peers.timed([python, "-c", "import time; time.sleep(9)"])[1]
 
 
-def test_without_pysph_it_says_what_to_do(peers):
+def test_missing_pysph_exits_with_suggestion(peers):
     with pytest.raises(SystemExit, match=r"has no PySPH\. Try: pip install"):
         peers.require_pysph("/no/such/python")

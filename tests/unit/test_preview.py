@@ -33,16 +33,16 @@ def figure(text, pattern):
     return float(re.search(pattern.replace("#", r"([0-9.e+-]*\d)"), text)[1])
 
 
-def test_parts_in_and_left_out():
+def test_preview_lists_parts_in_and_left_out():
     text = preview.describe(configuration.from_text(TUBE))
     inside, outside = re.search(r"Compiled in:\n(.*)Left out:\n(.*)Particles", text, re.S).groups()
     for part in ("1-D", "grad_h", "wendland_c2", "ideal_gas", "Balsara", "divergence", "u/|du/dt|"):
         assert part in inside
-    for part in ("equation for alpha: alpha is one number", "curl of velocity: no curl in 1-D"):
+    for part in ("equation for alpha: alpha is constant", "curl of velocity: no curl in 1-D"):
         assert part in outside
 
 
-def test_parts_that_the_configuration_takes_out():
+def test_preview_lists_parts_disabled_by_configuration():
     config = configuration.from_text(TUBE)
     config = config.override(["physics.balsara=false", "physics.energy_limit=false"])
     inside, outside = Scene(config).described()
@@ -51,7 +51,7 @@ def test_parts_that_the_configuration_takes_out():
         assert any(part in one for one in outside)
 
 
-def test_figures(simulation):
+def test_preview_figures_match_simulation(simulation):
     text = preview.describe(configuration.from_text(TUBE))
     assert figure(text, "Particles: #,") == simulation.particles.number
     dt = simulation.limit.dt
@@ -69,7 +69,7 @@ def test_figures(simulation):
     )
 
 
-def test_memory_counts_particles_and_lists(simulation):
+def test_preview_memory_counts_particles_and_lists(simulation):
     held = preview.bytes_held(simulation)
     assert held > sum(array.nbytes for array in simulation.particles.arrays().values())
     simulation.particles.alpha = np.zeros(1000)
@@ -80,7 +80,7 @@ def test_memory_counts_particles_and_lists(simulation):
     assert preview.bytes_held(simulation) == held + 8000 + 1000 * longer.itemsize
 
 
-def test_neighbours_are_counted(simulation):
+def test_preview_neighbours_match_count(simulation):
     x, H = simulation.particles.position[0], simulation.particles.support
     sign, offset = simulation.scene.domain.images
     images = np.concatenate([s * x + o for s, o in zip(sign[:, 0], offset[:, 0], strict=True)])
@@ -90,7 +90,7 @@ def test_neighbours_are_counted(simulation):
 
 
 @pytest.fixture
-def few(monkeypatch):
+def small_build_limit(monkeypatch):
     """Most particles that a preview builds, so few that a small run is beyond them."""
     monkeypatch.setattr(preview, "MOST_BUILT", 1000)
 
@@ -108,7 +108,7 @@ threads = 1
 """
 
 
-def test_figures_of_many_particles_are_scaled_from_fewer(few, monkeypatch, capsys):
+def test_preview_of_many_particles_scaled_from_fewer(small_build_limit, monkeypatch, capsys):
     scaled = described(BOX)
     assert "trying 1000 of 16384 particles" in capsys.readouterr().err
     assert figure(scaled, "Figures are scaled from # particles") == 1024  # 32 by 32
@@ -124,7 +124,7 @@ def test_figures_of_many_particles_are_scaled_from_fewer(few, monkeypatch, capsy
     assert figure(scaled, cost) == pytest.approx(figure(whole, cost), rel=0.8)
 
 
-def test_a_hundred_million_particles_are_previewed_at_once(few):
+def test_preview_of_hundred_million_particles_is_fast(small_build_limit):
     text = described(BOX, "problem.n=100000000")
     assert "Particles: some 1e+08," in text
     # 244 bytes or more a particle, by the arrays and lists of a small run
@@ -132,7 +132,7 @@ def test_a_hundred_million_particles_are_previewed_at_once(few):
 
 
 @pytest.mark.slow
-def test_a_problem_that_needs_more_particles_gets_them(few):
+def test_preview_problem_with_larger_minimum_uses_it(small_build_limit):
     contrast = BOX.replace("gresho", "contrast")
     keys = ["problem.masses=equal", "problem.profile=graded", "problem.ratio=1e5"]
     text = described(contrast, *keys, "problem.n=1000000")
@@ -140,13 +140,13 @@ def test_a_problem_that_needs_more_particles_gets_them(few):
     assert figure(text, "Figures are scaled from # particles") > 3000
 
 
-def test_a_run_that_fails_with_fewer_particles_too_says_with_how_many(few):
+def test_preview_failure_names_particle_number(small_build_limit):
     tube = BOX.replace("gresho", "shock_tube").replace("16384", "50000")
     with pytest.raises(NumericalError, match="with 4000 particles"):
         described(tube, "physics.max_energy_drift=1e-300")
 
 
-def test_a_step_too_short_to_count_is_told(monkeypatch):
+def test_preview_with_tiny_step_is_reported(monkeypatch):
     assert preview._count(float("inf"), True) == "some inf"
     assert preview._count(3.2, True) == "4"
     assert preview._count(123456.0, False) == "some 1.23e+05"

@@ -63,7 +63,7 @@ def cloud(problem, n=600):
     return gas(n, mass=np.full(n, 0.5)), count
 
 
-def test_a_clouds_velocity_is_the_mean_of_its_particles_over_the_winds():
+def test_cloud_velocity_is_mean_over_wind_velocity():
     problem = blob.Problem(radius=2.0)
     particles, count = cloud(problem)
     velocity = particles.velocity[0, np.argsort(particles.id)[:count]].mean()
@@ -77,7 +77,7 @@ def test_a_clouds_velocity_is_the_mean_of_its_particles_over_the_winds():
 
 
 @pytest.mark.parametrize(("dimension", "ball"), [(2, np.pi), (3, 4.0 / 3.0 * np.pi)])
-def test_cloud_is_what_is_both_dense_and_cold_by_mass(dimension, ball):
+def test_cloud_mass_is_dense_and_cold_gas(dimension, ball):
     problem = blob.Problem(dimension=dimension, radius=2.0, density_ratio=5.0)
     # cloud is denser than 3.2, and colder than 0.9 of the median of u, 10; the mean is far above
     particles = gas(
@@ -91,7 +91,7 @@ def test_cloud_is_what_is_both_dense_and_cold_by_mass(dimension, ball):
     assert found == pytest.approx(expected, rel=ROUND_OFF)
 
 
-def test_contrast_takes_the_fastest_particle_by_its_own_sound_speed():
+def test_contrast_mach_number_is_largest_over_particles():
     problem = contrast.Problem(dimension=2, pressure=2.0)
     particles = gas()
     pressure = 2.0 * np.linspace(1.1, 0.7, 12)
@@ -105,7 +105,7 @@ def test_contrast_takes_the_fastest_particle_by_its_own_sound_speed():
     assert problem.compare(MONATOMIC, 0.0, particles, pressure) == approx(pressure_error=0.3)
 
 
-def test_an_expanding_ball_is_measured_from_its_centre():
+def test_expanding_ball_measured_from_centre():
     problem = ball.Problem(dimension=2, domain=[[0.0, 2.0], [1.0, 5.0]], n=100)
     particles = gas()
     particles.position += np.array([[1.0], [3.0]])
@@ -131,7 +131,7 @@ def test_an_expanding_ball_is_measured_from_its_centre():
     assert problem.error_region(AIR, 2.0, x)[0].tolist() == [True, False]
 
 
-def test_particles_given_one_by_one_report_their_bounds():
+def test_given_particles_report_bounds():
     particles = gas()
     found = given.Problem().report(AIR, 0.0, particles, None)
     assert found == {
@@ -143,7 +143,7 @@ def test_particles_given_one_by_one_report_their_bounds():
         assert values.argmin() != 0  # the first particle is not the lowest
 
 
-def test_the_centre_of_unequal_masses_is_compared_along_every_axis():
+def test_given_particles_centre_of_mass_compared_on_every_axis():
     problem = given.Problem(
         dimension=2, positions=[[0.0, 0.0], [1.0, 0.5]], velocities=[[1.0, 0.0], [0.0, 3.0]],
         masses=[3.0, 1.0],
@@ -161,7 +161,7 @@ def test_the_centre_of_unequal_masses_is_compared_along_every_axis():
 # --- rings and squares ------------------------------------------------------------------------
 
 
-def test_a_ring_deviates_by_particle_and_without_its_edges():
+def test_ring_deviation_per_particle_without_edges():
     problem = keplerian_ring.Problem(n=200)
     radius, angle, mass = problem._circles()
     order = np.random.default_rng(2).permutation(radius.size)
@@ -179,7 +179,7 @@ def test_a_ring_deviates_by_particle_and_without_its_edges():
     )
 
 
-def test_a_wider_ring_deviates_by_its_width_and_orbits_by_its_middle():
+def test_ring_width_and_orbits_measured_at_middle():
     problem = keplerian_ring.Problem(n=200, inner=1.0, outer=3.0)
     radius, angle, _ = problem._circles()
     particles = gas(
@@ -202,7 +202,7 @@ def test_a_wider_ring_deviates_by_its_width_and_orbits_by_its_middle():
     assert problem.over_time(AIR, history)["orbits_intact"] == pytest.approx(40.0 / period)
 
 
-def test_gas_outside_the_square_is_counted_on_all_sides():
+def test_square_counts_gas_outside_all_sides():
     problem = square.Problem(n=112)
     state = problem.initial(AIR)
     n = state.mass.size
@@ -216,7 +216,7 @@ def test_gas_outside_the_square_is_counted_on_all_sides():
 # --- uniform gas, vortices and layers ---------------------------------------------------------
 
 
-def test_uniform_gas_spreads_from_lowest_to_highest_and_goes_either_way():
+def test_uniform_spread_is_lowest_to_highest():
     problem = uniform.Problem(velocity=[-3.0, 1.0], domain=[0.0, 2.0])
     particles = gas()
     spread = {
@@ -228,14 +228,14 @@ def test_uniform_gas_spreads_from_lowest_to_highest_and_goes_either_way():
 
 
 @pytest.mark.parametrize("lattice_kind", ["relaxed", "random"])
-def test_uniform_gas_off_a_lattice_may_drift_until_it_has_settled(lattice_kind):
+def test_uniform_off_lattice_has_larger_limits(lattice_kind):
     on_lattice = uniform.Problem().allowed()["energy_drift"]
     assert on_lattice.bound == 1e-10
     assert uniform.Problem(lattice=lattice_kind).allowed()["energy_drift"].bound == 1e-3
     assert uniform.Problem(noise=0.1).allowed()["energy_drift"].bound == 1e-3
 
 
-def test_rotation_is_weighed_by_volume_in_rings_one_spacing_wide():
+def test_vortex_rotation_weighted_by_volume_in_rings():
     problem = gresho.Problem(velocity=[0.5, -1.0])
     particles = gas(16, low=-0.4, high=0.4)
     offset, time = particles.position, 0.25
@@ -268,7 +268,7 @@ def amplitude(particles, wavenumber, height, velocity):
     return 2.0 * abs((weight * velocity * wave).sum()) / weight.sum()
 
 
-def test_modes_of_shear_layers_are_those_of_velocities_across():
+def test_shear_layer_mode_uses_transverse_velocity():
     particles = gas(12, low=-0.5, high=0.5)
     y, across = particles.position[1], particles.velocity[1]
     sharp = amplitude(particles, 12.0 * np.pi, y, np.sign(y) * across)
@@ -291,7 +291,7 @@ def layers(monkeypatch):
     return problem
 
 
-def test_growth_is_fitted_between_its_times_and_compared_with_theory(layers):
+def test_shear_layer_growth_fitted_and_compared_with_theory(layers):
     t = np.linspace(0.0, 1.5, 16)
     # before 0.5 and after 1 the amplitude does something else
     grown = np.where((t < 0.45) | (t > 1.05), 1.0, 0.02 * np.exp(1.5 * t))
@@ -302,12 +302,12 @@ def test_growth_is_fitted_between_its_times_and_compared_with_theory(layers):
 @pytest.mark.parametrize(
     "times", [[0.6, 0.8, 1.0, 1.2], [0.4, 0.6, 0.8], [0.4, 0.7, 1.2], [0.2, 1.5]]
 )
-def test_growth_is_left_out_of_a_history_that_does_not_span_its_times(layers, times):
+def test_shear_layer_growth_of_short_history_is_missing(layers, times):
     t = np.array(times)
     assert layers.over_time(MONATOMIC, {"t": t, "mode_amplitude": np.exp(t)}) == {}
 
 
-def test_theory_of_the_layers_starts_at_the_seeded_amplitude():
+def test_shear_layer_theory_starts_at_seeded_amplitude():
     problem = kelvin_helmholtz_smooth.Problem()
     found = problem.theory(MONATOMIC, np.array([0.0]))["mode_amplitude"]
     assert found == pytest.approx(0.01, rel=1e-9)
@@ -323,7 +323,7 @@ def falling_gas(n=40):
     return gas(n, 1, position=x, density=np.where(x[0] < 0.22, 3.5, 1.2) + 0.3 * random.random(n))
 
 
-def test_figures_of_the_implosion_in_one_dimension():
+def test_implosion_figures_1d():
     problem = implosion.Problem()
     particles = falling_gas()
     x, dx = particles.position[0], particles.mass / particles.density
@@ -355,7 +355,7 @@ def test_figures_of_the_implosion_in_one_dimension():
     assert problem.compare(MONATOMIC, 0.0, particles, pressure) == {}
 
 
-def test_figures_of_the_blast_are_of_radii_from_the_centre():
+def test_blast_figures_use_radius_from_centre():
     problem = point_explosion.Problem(dimension=2, density=2.0, domain=[0.0, 1.0])
     particles = gas(12, low=0.1, high=0.9)
     offset = particles.position - 0.5
@@ -382,7 +382,7 @@ def test_figures_of_the_blast_are_of_radii_from_the_centre():
     assert "momentum_radius_error" not in problem.compare(AIR, 1.0, particles, None)
 
 
-def test_waves_behind_a_shock_are_weighed_by_volume_within_their_train():
+def test_shu_osher_waves_weighted_by_volume_in_wave_train():
     x = np.array([1.05, 1.15, 1.5, 2.0, 2.85, 2.95, 3.0, 3.2])
     density = np.array([9.0, 4.0, 3.0, 4.5, 3.5, 8.0, 2.1, 1.2])
     order = np.random.default_rng(6).permutation(8)
@@ -396,7 +396,7 @@ def test_waves_behind_a_shock_are_weighed_by_volume_within_their_train():
     )
 
 
-def test_colliding_blasts_are_compared_by_volume(monkeypatch):
+def test_blast_waves_compared_by_volume(monkeypatch):
     problem = blast_waves.Problem()
     particles = gas(12, 1, low=0.0)
     assert particles.density.argmax() != 11
@@ -414,7 +414,7 @@ def test_colliding_blasts_are_compared_by_volume(monkeypatch):
 # --- waves ------------------------------------------------------------------------------------
 
 
-def test_errors_of_a_wave_are_in_its_amplitude_along_every_axis():
+def test_sound_wave_errors_in_units_of_amplitude():
     problem = sound_wave.Problem(dimension=2, amplitude=0.05)
     particles = gas(12, low=0.0, high=1.0)
     time = 0.3
@@ -432,7 +432,7 @@ def test_errors_of_a_wave_are_in_its_amplitude_along_every_axis():
     )
 
 
-def test_what_a_wave_may_drift_and_miss_follows_its_amplitude_and_dimension():
+def test_sound_wave_limits_follow_amplitude_and_dimension():
     line = sound_wave.Problem().allowed()
     assert line["energy_drift"].bound == 1e-12
     assert line["error_velocity_relative"].bound == 0.004

@@ -52,7 +52,7 @@ def inside(problem, position):
 
 
 @pytest.mark.parametrize("name", registry.names("sph.problems"))
-def test_initial_state_has_the_shapes_and_stays_in_its_box(name):
+def test_initial_state_has_declared_shapes_inside_box(name):
     problem = registry.load("sph.problems", name).Problem()
     state = problem.initial(MONATOMIC)
     n = state.mass.size
@@ -85,7 +85,7 @@ def test_limits_and_defaults_name_tables_and_reasons(name):
         Uniform(dimension=3, n=500, velocity=[1.0, 2.0, 3.0], density=2.0, pressure=0.5),
     ],
 )
-def test_exact_solution_at_the_start_is_the_initial_state(problem):
+def test_exact_solution_at_start_equals_initial_state(problem):
     state = problem.initial(AIR)
     exact = problem.exact(AIR, 0.0, state.position)
     np.testing.assert_array_equal(exact["velocity"], state.velocity)
@@ -103,7 +103,7 @@ class OtherGas:
 
 
 @pytest.mark.parametrize("name", registry.names("sph.problems"))
-def test_a_problem_that_takes_any_gas_asks_nothing_but_its_formulas(name):
+def test_problem_for_any_gas_uses_only_its_formulas(name):
     problem = registry.load("sph.problems", name).Problem()
     if problem.ideal_gas:  # the configuration refuses others
         return
@@ -119,7 +119,7 @@ def test_a_problem_that_takes_any_gas_asks_nothing_but_its_formulas(name):
 # --- shock tube -------------------------------------------------------------------------------
 
 
-def test_sod_has_one_mass_and_spacings_counted_from_the_diaphragm():
+def test_sod_equal_masses_and_spacing_from_diaphragm():
     state = ShockTube().initial(AIR)
     x, mass = state.position[0], state.mass[0]
     # 352 + 44: the nearest to 400 that fill both sides, 8 to 1, exactly
@@ -137,7 +137,7 @@ def test_sod_has_one_mass_and_spacings_counted_from_the_diaphragm():
 
 
 @pytest.mark.parametrize(("density", "numbers"), [(0.25, (800, 200)), (1.0, (500, 500))])
-def test_tubes_of_the_seed_have_its_numbers(density, numbers):
+def test_tubes_have_specified_particle_numbers(density, numbers):
     problem = ShockTube(
         n=1000,
         domain=[-1.0, 1.0],
@@ -148,7 +148,7 @@ def test_tubes_of_the_seed_have_its_numbers(density, numbers):
     assert ((x < 0).sum(), (x > 0).sum()) == numbers
 
 
-def test_three_dimensional_sod_has_the_cells_of_other_codes():
+def test_sod_3d_has_cells_of_other_codes():
     problem = ShockTube(**SOD_3D)
     state = problem.initial(MONATOMIC)
     assert state.mass.size == 98784
@@ -164,7 +164,7 @@ def test_three_dimensional_sod_has_the_cells_of_other_codes():
             np.testing.assert_allclose(np.diff(values), step, rtol=0, atol=2e-9)
 
 
-def test_one_pair_of_ends_makes_a_thin_box_periodic_across():
+def test_tube_thin_box_periodic_across():
     problem = ShockTube(dimension=3, n=1000, domain=[-1.0, 1.0], boundary="mirror")
     np.testing.assert_array_equal(problem.box, [[-1.0, 1.0], [-0.25, 0.25], [-0.25, 0.25]])
     assert problem.boundaries == ("mirror", "periodic", "periodic")
@@ -173,7 +173,7 @@ def test_one_pair_of_ends_makes_a_thin_box_periodic_across():
 @pytest.mark.parametrize(
     ("dimension", "kind"), [(1, "cubic"), (2, "cubic"), (2, "hexagonal"), (3, "cubic"), (3, "bcc")]
 )
-def test_layers_of_any_two_gases_stay_inside_and_carry_their_mass(dimension, kind):
+def test_tube_layers_inside_box_with_exact_mass(dimension, kind):
     random = np.random.default_rng(5)
     for _ in range(40):
         densities = 10 ** random.uniform(-1.0, 1.0, 2)
@@ -199,7 +199,7 @@ def test_layers_of_any_two_gases_stay_inside_and_carry_their_mass(dimension, kin
 
 
 @pytest.mark.parametrize("dimension", [1, 2, 3])
-def test_equal_spacing_has_one_lattice_and_masses_in_the_ratio_of_densities(dimension):
+def test_tube_equal_spacing_masses_in_ratio_of_densities(dimension):
     gas = {"left": {"density": 1.0, "pressure": 1.0}, "right": {"density": 1e-3, "pressure": 1.0}}
     n = 36 * 9**2 if dimension == 3 else 2000  # cubes that fit both sides
     problem = ShockTube(
@@ -217,7 +217,7 @@ def test_equal_spacing_has_one_lattice_and_masses_in_the_ratio_of_densities(dime
     np.testing.assert_allclose(np.diff(layers), 9.0 / len(layers), rtol=1e-6)  # of the rounding
 
 
-def test_layers_keep_their_distance_across_diaphragm_and_transverse_faces():
+def test_tube_layers_keep_spacing_across_diaphragm_and_faces():
     problem = ShockTube(**SOD_3D)
     state = problem.initial(MONATOMIC)
     shifted = (state.position - problem.box[:, :1]).T
@@ -229,27 +229,27 @@ def test_layers_keep_their_distance_across_diaphragm_and_transverse_faces():
     np.testing.assert_allclose(distance[bulk], np.sqrt(3.0) / 2.0 / 28.0, rtol=1e-9)
 
 
-def test_a_domain_whose_cells_cannot_be_counted_is_refused():
+def test_tube_domain_with_too_many_cells_is_refused():
     domain = "[[-1e-160, 1e-160], [-0.25, 0.25], [-0.25, 0.25]]"
     text = f'[problem]\nname = "shock_tube"\ndimension = 3\ndomain = {domain}\n'
     with pytest.raises(ConfigError, match=r"problem: .* expected numbers closer to 1"):
         from_text(text)
 
 
-def test_walls_part_from_gas_whose_pressure_is_too_low_to_compute_with():
+def test_uniform_gas_with_tiny_pressure_does_not_fill_box():
     assert Uniform(pressure=1e-300).fills_box(AIR) is False
     assert Uniform(pressure=1.0).fills_box(AIR) is True
 
 
 @pytest.mark.parametrize("side", ["left", "right"])
 @pytest.mark.filterwarnings("error")
-def test_gases_too_different_in_density_for_n_are_refused(side):
+def test_tube_density_ratio_too_large_for_n_is_refused(side):
     thin = {"density": 1e-150, "velocity": 0.0, "pressure": 1.0}
     with pytest.raises(ValidationError, match=r"n = 2000: expected at least \S+, for one layer"):
         ShockTube(**{**SOD_3D, "n": 2000, side: thin})
 
 
-def test_exact_tube_moves_with_its_diaphragm_and_is_the_riemann_solution():
+def test_tube_exact_solution_is_riemann_solution_at_diaphragm():
     problem = ShockTube(dimension=2, n=200, discontinuity=0.1)
     position = np.array([[-0.4, 0.05, 0.2, 0.45], [0.0, 0.1, -0.1, 0.0]])
     exact = problem.exact(AIR, 0.1, position)
@@ -261,14 +261,14 @@ def test_exact_tube_moves_with_its_diaphragm_and_is_the_riemann_solution():
     np.testing.assert_array_equal(exact["pressure"], pressure)
 
 
-def test_vacuum_between_parting_gases_has_no_internal_energy():
+def test_tube_vacuum_has_no_internal_energy():
     apart = {"density": 1.0, "pressure": 0.1}
     problem = ShockTube(left=apart | {"velocity": -5.0}, right=apart | {"velocity": 5.0})
     exact = problem.exact(AIR, 0.05, np.array([[0.0]]))
     assert exact["density"] == exact["internal_energy"] == 0.0
 
 
-def test_plateaus_are_as_good_in_any_frame():
+def test_tube_plateaus_independent_of_frame():
     problem = ShockTube(
         left={"density": 1.0, "velocity": -0.9274526, "pressure": 1.0},  # the contact stands still
         right={"density": 0.125, "velocity": -0.9274526, "pressure": 0.1},
@@ -283,7 +283,7 @@ def test_plateaus_are_as_good_in_any_frame():
         assert found == pytest.approx(0.01 / 0.9274526, rel=1e-6)
 
 
-def test_report_measures_shocks_contact_and_density_as_by_hand():
+def test_tube_report_matches_by_hand():
     problem = ShockTube(n=2000, error_range=[-0.45, 0.45])
     state = problem.initial(AIR)
     x = state.position[0]
@@ -302,7 +302,7 @@ def test_report_measures_shocks_contact_and_density_as_by_hand():
     assert report["density_L1_relative"] == pytest.approx(0.03, rel=1e-12)
 
 
-def test_report_of_parting_gas_takes_the_nearest_to_the_middle():
+def test_tube_report_of_separating_gas_uses_nearest_to_middle():
     gas = {"density": 1.0, "pressure": 0.4}
     problem = ShockTube(
         n=100, left=gas | {"velocity": -2.0}, right=gas | {"velocity": 2.0}, boundary="open"
@@ -318,14 +318,14 @@ def test_report_of_parting_gas_takes_the_nearest_to_the_middle():
     assert not any(name.startswith(("plateau", "shock")) for name in report)
 
 
-def test_an_equation_of_state_without_exact_solution_has_no_figures():
+def test_tube_report_without_exact_solution_is_empty():
     problem, gas = ShockTube(), SimpleNamespace()
     state = ShockTube().initial(AIR)
     assert problem.exact(gas, 0.1, state.position) is None
     assert problem.compare(gas, 0.1, particles_of(state, 1.0), None) == {}
 
 
-def test_errors_are_taken_within_the_range_that_is_given():
+def test_tube_error_region_is_given_range():
     problem = ShockTube(domain=[-1.0, 1.0], error_range=[-0.45, 0.4])
     mask, words = problem.error_region(AIR, 0.1, np.array([[-0.5, -0.45, -0.4, 0.39, 0.4]]))
     assert mask.tolist() == [False, False, True, True, False]
@@ -333,7 +333,7 @@ def test_errors_are_taken_within_the_range_that_is_given():
     assert ShockTube().error_region(AIR, 0.1, np.array([[-0.5]]))[0].all()
 
 
-def test_report_of_the_exact_profile_finds_no_error_and_sees_one():
+def test_explosion_report_exact_profile_has_no_error():
     problem = ShockTube()
     state = problem.initial(AIR)
     exact = problem.exact(AIR, 0.2, state.position)
@@ -349,7 +349,7 @@ def test_report_of_the_exact_profile_finds_no_error_and_sees_one():
     assert wrong["plateau_right_pressure_error"] == pytest.approx(0.01, abs=1e-14)
 
 
-def test_figures_of_a_region_without_particles_are_left_out():
+def test_explosion_report_without_particles_in_region_is_partial():
     problem = ShockTube(error_range=[0.1, 0.1 + 1e-9])
     position, velocity, mass, energy = problem.initial(AIR)
     particles = SimpleNamespace(
@@ -365,12 +365,12 @@ def test_figures_of_a_region_without_particles_are_left_out():
         ({"discontinuity": 0.5}, "expected x inside"),
         ({"error_range": [0.4, -0.4]}, "with lo < hi"),
         ({"error_range": [10.0, 11.0]}, "inside the domain"),
-        ({"lattice": "bcc"}, 'take "cubic"'),
+        ({"lattice": "bcc"}, 'expected "cubic"'),
         ({"n": 3, "right": {"density": 1e-3, "pressure": 1.0}}, "at least 1000"),
         ({"left": {"density": 0.0, "pressure": 1.0}}, "greater than 0"),
     ],
 )
-def test_impossible_tubes_are_refused_with_the_reason(keys, message):
+def test_tube_invalid_keys_are_refused(keys, message):
     with pytest.raises(ValidationError, match=message):
         ShockTube(**keys)
 
@@ -381,7 +381,7 @@ def test_impossible_tubes_are_refused_with_the_reason(keys, message):
 @pytest.mark.parametrize(
     ("dimension", "n", "found"), [(1, 99, 98), (2, 16384, 16384), (3, 32768, 32768)]
 )
-def test_energy_is_released_symmetrically_and_completely(dimension, n, found):
+def test_explosion_energy_is_symmetric_and_complete(dimension, n, found):
     problem = PointExplosion(dimension=dimension, n=n)
     state = problem.initial(MONATOMIC)
     assert state.mass.size == found
@@ -403,11 +403,11 @@ def test_energy_is_released_symmetrically_and_completely(dimension, n, found):
     assert farthest_hot < np.linalg.norm(state.position[:, ~hot], axis=0).min()
 
 
-def test_lattice_of_the_explosion_is_even_where_n_is_not():
+def test_explosion_lattice_is_even_for_odd_n():
     assert PointExplosion(dimension=2).initial(MONATOMIC).mass.size == 182**2
 
 
-def test_exact_explosion_points_outward_and_is_that_of_sedov():
+def test_explosion_exact_solution_is_sedov_outward():
     problem = PointExplosion(domain=[0.0, 1.0])  # centred on 1/2
     radius = 0.3
     direction = np.array([1.0, 2.0, -2.0]) / 3.0
@@ -425,7 +425,7 @@ def test_exact_explosion_points_outward_and_is_that_of_sedov():
     np.testing.assert_array_equal(before["velocity"], 0.0)
 
 
-def test_error_region_follows_the_shock_up_to_the_faces():
+def test_explosion_error_region_follows_shock_up_to_faces():
     problem = PointExplosion()
     position = np.array([[0.416, 0.418, 0.499], [0.0] * 3, [0.0] * 3])
     mask, words = problem.error_region(MONATOMIC, 0.05, position)
@@ -436,7 +436,7 @@ def test_error_region_follows_the_shock_up_to_the_faces():
     assert problem.error_region(MONATOMIC, 0.0, position)[0].all()
 
 
-def test_momentum_weighted_radius_of_the_exact_profile_is_exact():
+def test_explosion_momentum_weighted_radius_of_exact_profile():
     problem = PointExplosion(n=64**3)
     state = problem.initial(MONATOMIC)
     # Particles of equal volumes with masses after the density: a quadrature of the profile
@@ -458,7 +458,7 @@ def test_momentum_weighted_radius_of_the_exact_profile_is_exact():
     assert leaning["momentum_radius"] == pytest.approx(report["momentum_radius"], rel=ROUND_OFF)
 
 
-def test_more_energetic_particles_than_there_are_is_refused():
+def test_explosion_more_energetic_particles_than_n_is_refused():
     with pytest.raises(Exception, match="energy_particles = 32: expected at most 8"):
         PointExplosion(n=8).initial(MONATOMIC)
 
@@ -467,7 +467,7 @@ def test_more_energetic_particles_than_there_are_is_refused():
 
 
 @pytest.mark.parametrize("kind", ["cubic", "hexagonal"])
-def test_sharp_layers_have_one_mass_and_densities_two_to_one(kind):
+def test_kelvin_helmholtz_equal_masses_and_density_ratio_two(kind):
     state = KelvinHelmholtz(lattice=kind).initial(MONATOMIC)
     n = state.mass.size
     y = state.position[1]
@@ -484,7 +484,7 @@ def test_sharp_layers_have_one_mass_and_densities_two_to_one(kind):
 
 
 @pytest.mark.parametrize(("kind", "nearest"), [("cubic", 1.0), ("hexagonal", 1.0746)])
-def test_sharp_layers_are_lattices_up_to_their_faces(kind, nearest):
+def test_kelvin_helmholtz_layers_are_lattices_up_to_interfaces(kind, nearest):
     problem = KelvinHelmholtz(lattice=kind)
     state = problem.initial(MONATOMIC)
     slab = np.abs(state.position[1]) < 0.25
@@ -499,7 +499,7 @@ def test_sharp_layers_are_lattices_up_to_their_faces(kind, nearest):
         assert distance.max() < 1.03 * nearest
 
 
-def test_sharp_problem_is_its_mirror_image_in_y():
+def test_kelvin_helmholtz_initial_state_symmetric_in_y():
     state = KelvinHelmholtz(lattice="cubic", n=3000).initial(MONATOMIC)
     rows = np.vstack([state.position, state.velocity, state.internal_energy[None]])
     mirrored = rows * np.array([1, -1, 1, -1, 1])[:, None]
@@ -512,7 +512,7 @@ def test_sharp_problem_is_its_mirror_image_in_y():
     assert np.abs(state.velocity[1]).max() > 0.02
 
 
-def test_sharp_mode_starts_as_the_seeded_band():
+def test_kelvin_helmholtz_mode_starts_as_seeded_band():
     problem = KelvinHelmholtz(lattice="cubic", n=3 * 280 * 140)  # 1.0 and 0.98 for aspect ratios
     state = problem.initial(MONATOMIC)
     slab = np.abs(state.position[1]) < 0.25
@@ -526,7 +526,7 @@ def test_sharp_mode_starts_as_the_seeded_band():
     assert growth == pytest.approx(0.3536, abs=5e-5)  # the digits that are published
 
 
-def test_mode_is_blind_to_its_phase_and_to_other_wavelengths():
+def test_kelvin_helmholtz_mode_ignores_phase_and_other_wavelengths():
     problem = KelvinHelmholtz(n=24000)
     state = problem.initial(MONATOMIC)
     x, y = state.position
@@ -550,7 +550,7 @@ def test_mode_is_blind_to_its_phase_and_to_other_wavelengths():
     assert amplitude(in_slab) == pytest.approx(one / 2, rel=0.02)
 
 
-def test_smooth_mode_starts_at_the_published_amplitude():
+def test_smooth_kelvin_helmholtz_mode_starts_at_published_amplitude():
     problem = SmoothKelvinHelmholtz()
     state = problem.initial(MONATOMIC)
     density = state.mass * state.mass.size
@@ -558,7 +558,7 @@ def test_smooth_mode_starts_at_the_published_amplitude():
     assert amplitude == pytest.approx(0.01, rel=1e-12)  # volumes are equal: sums over whole waves
 
 
-def test_smooth_layers_follow_the_published_profile():
+def test_smooth_kelvin_helmholtz_layers_match_published_profile():
     problem = SmoothKelvinHelmholtz()
     state = problem.initial(MONATOMIC)
     density = state.mass * state.mass.size
@@ -583,7 +583,7 @@ def test_smooth_layers_follow_the_published_profile():
 
 
 @pytest.mark.parametrize("problem", [KelvinHelmholtz, SmoothKelvinHelmholtz])
-def test_shear_layers_refuse_another_domain(problem):
+def test_kelvin_helmholtz_other_domain_is_refused(problem):
     with pytest.raises(ValidationError, match="along both axes only"):
         problem(domain=[0.0, 2.0])
     for key, value in (("boundary", "mirror"), ("dimension", 3)):
@@ -609,7 +609,7 @@ def test_uniform_gas_is_uniform(dimension, kind):
 
 
 @pytest.mark.parametrize(("dimension", "kind"), [(1, "cubic"), (2, "hexagonal"), (3, "bcc")])
-def test_lattice_without_noise_feels_no_force(dimension, kind):
+def test_uniform_lattice_without_noise_has_no_force(dimension, kind):
     """Sum over neighbours of an odd function of their distance: nil at every lattice site."""
     problem = Uniform(dimension=dimension, n=500, lattice=kind)
 
@@ -630,7 +630,7 @@ def test_lattice_without_noise_feels_no_force(dimension, kind):
 def test_uniform_velocity_has_a_component_for_each_axis():
     with pytest.raises(ValidationError, match="expected 2 components"):
         Uniform(velocity=[1.0, 2.0, 3.0])
-    with pytest.raises(ValidationError, match='take "cubic" or "hexagonal"'):
+    with pytest.raises(ValidationError, match='expected "cubic" or "hexagonal"'):
         Uniform(lattice="bcc")
 
 
@@ -653,5 +653,5 @@ SOUND = np.sqrt(5.0 / 3.0)  # of MONATOMIC gas of density and pressure 1, which 
         (Noh(), False),
     ],
 )  # fmt: skip
-def test_gas_fills_the_box_unless_it_leaves_vacuum_behind(problem, fills):
+def test_problem_fills_box_unless_vacuum(problem, fills):
     assert problem.fills_box(MONATOMIC) == fills

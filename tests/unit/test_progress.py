@@ -35,7 +35,7 @@ threads = 1
 """
 
 
-class Hours:
+class ManualClock:
     """A clock that the test turns."""
 
     now = 100.0
@@ -46,7 +46,7 @@ class Hours:
 
 @pytest.fixture
 def clock(monkeypatch):
-    hours = Hours()
+    hours = ManualClock()
     monkeypatch.setattr(progress, "time", hours)
     return hours
 
@@ -55,7 +55,7 @@ def at(time, step=1, dt=0.01):
     return SimpleNamespace(time=time, step=step, limit=SimpleNamespace(dt=dt))
 
 
-def test_lines_come_seconds_apart_with_the_time_left(clock, capsys):
+def test_lines_printed_seconds_apart_with_time_left(clock, capsys):
     lines = progress.Lines()
     lines.start(0.0, 1.0)
     clock.now += 40.0  # the first step compiles
@@ -74,7 +74,7 @@ def test_lines_come_seconds_apart_with_the_time_left(clock, capsys):
     lines.close()
 
 
-def test_steps_too_small_to_be_seen_divide_nothing_by_zero(clock, capsys):
+def test_tiny_steps_cause_no_division_by_zero(clock, capsys):
     lines = progress.Lines()
     lines.start(1.0, 2.0)
     for step in range(3):
@@ -83,7 +83,7 @@ def test_steps_too_small_to_be_seen_divide_nothing_by_zero(clock, capsys):
     assert "left" not in capsys.readouterr().err
 
 
-def test_time_left_of_a_restart_counts_from_where_it_began(clock, capsys):
+def test_time_left_after_restart_counts_from_its_start(clock, capsys):
     lines = progress.Lines()
     lines.start(5.0, 6.0)
     lines.step(at(5.0))
@@ -111,11 +111,11 @@ def test_bar_reaches_its_end_without_warnings(begin, monkeypatch):
     assert re.search(r"t = 0\.7 of 0\.7, step 8, dt 0\.01 \[00:0\d, .* left\]", stream.getvalue())
 
 
-def test_bar_that_never_started_closes():
+def test_bar_never_started_closes():
     progress.Bar().close()
 
 
-def test_a_sweeps_bar_counts_points_and_keeps_lines_whole(monkeypatch):
+def test_sweep_bar_counts_points_and_keeps_lines_whole(monkeypatch):
     stream = io.StringIO()
     monkeypatch.setattr(sys, "stderr", stream)
     bar = progress.RunBar("points", 4, 1)
@@ -134,7 +134,7 @@ def on_terminal(monkeypatch, columns):
     monkeypatch.setattr(os, "get_terminal_size", lambda descriptor: os.terminal_size((columns, 24)))
 
 
-def test_which_is_suited(monkeypatch):
+def test_progress_is_bar_on_terminal_and_lines_elsewhere(monkeypatch):
     assert type(progress.suited()) is progress.Lines  # the tests' own stderr is no terminal
     on_terminal(monkeypatch, 80)
     assert type(progress.suited()) is progress.Bar
@@ -154,7 +154,7 @@ def test_lines_of_many_runs_count_where_their_number_is_known(capsys):
     assert capsys.readouterr().err == f"{said}physics.C = 0.1: stable\n"
 
 
-def test_a_sweep_on_a_terminal_shows_a_bar(monkeypatch):
+def test_sweep_on_terminal_shows_bar(monkeypatch):
     stream = io.StringIO()
     stream.isatty, stream.fileno = lambda: True, lambda: 2
     monkeypatch.setattr(sys, "stderr", stream)
@@ -167,7 +167,7 @@ def test_a_sweep_on_a_terminal_shows_a_bar(monkeypatch):
 
 
 @pytest.mark.slow
-def test_a_run_on_a_terminal_shows_a_bar_and_keeps_stdout_for_the_summary(tmp_path):
+def test_run_on_terminal_shows_bar_and_summary_on_stdout(tmp_path):
     (tmp_path / "tube.toml").write_text(TUBE)
     terminal, its_end = pty.openpty()
     ioctl(its_end, termios.TIOCSWINSZ, struct.pack("HHHH", 24, 100, 0, 0))
@@ -196,7 +196,7 @@ def test_a_run_on_a_terminal_shows_a_bar_and_keeps_stdout_for_the_summary(tmp_pa
     assert "%|" not in out
 
 
-def test_a_time_left_beyond_all_bounds_stays_short(clock, capsys):
+def test_time_left_enormous_stays_short(clock, capsys):
     lines = progress.Lines()
     lines.start(0.0, 1e300)
     lines.step(at(1.0))

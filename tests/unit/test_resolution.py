@@ -45,7 +45,7 @@ def far_box(dimension, gap, boundary="periodic"):
 @pytest.mark.parametrize(
     ("dimension", "refused", "doubted"), [(1, 2.0**-18, 2.0**-28), (2, 2.0**-15, 2.0**-25)]
 )
-def test_positions_at_both_thresholds(simulate, dimension, refused, doubted, boundary):
+def test_position_resolution_at_both_thresholds(simulate, dimension, refused, doubted, boundary):
     with pytest.raises(NumericalError, match=r"resolve the position[\s\S]*closer to 0") as caught:
         resolution.check(simulate(far_box(dimension, refused, boundary)))
     assert caught.value.particle > 0
@@ -59,7 +59,7 @@ def test_positions_at_both_thresholds(simulate, dimension, refused, doubted, bou
 
 
 @pytest.mark.parametrize("dimension", [1, 2])
-def test_particles_that_coincide_for_rounding_are_refused_as_such(dimension):
+def test_particles_coincident_by_rounding_are_refused(dimension):
     clock = Clock()
     simulation = Simulation.of_problem(Scene(far_box(dimension, 0.25)), 1, clock)
     with pytest.raises(NumericalError, match="does not resolve the position"):
@@ -77,7 +77,7 @@ def change(simulation):
     return max(np.abs(p.velocity).max() / np.sqrt(1.4 * 0.4 * u), np.ptp(p.internal_energy) / u)
 
 
-def test_what_is_refused_is_wrong_and_what_is_not_is_right(simulate, monkeypatch):
+def test_refused_positions_give_wrong_density_accepted_right(simulate, monkeypatch):
     assert change(simulate(far_box(1, 2.0**-19))) < 1e-3  # the largest gap that is not refused
     assert change(simulate(far_box(1, 2.0**-29))) < 1e-6  # the largest of which nothing is told
     monkeypatch.setattr(resolution, "REFUSED", np.inf)
@@ -90,7 +90,7 @@ def moving(name, mach):
     return config.override([f"problem.velocity=[{mach * np.sqrt(1.4):.17g}, 0.0]"])
 
 
-def test_bulk_motion_at_both_thresholds(simulate):
+def test_velocity_resolution_at_both_thresholds(simulate):
     shipped = simulate(configuration.load(CONFIGS / "moving_box.toml"))  # Mach 1e5
     resolution.check(shipped)
     assert resolution.doubt(shipped) is None
@@ -116,12 +116,12 @@ def gas(velocity, n=4):
         ([0.0, 0.0, 0.0, 0.0], np.nan),  # gas torn apart: the watchdog tells
     ],
 )
-def test_cold_gas_is_not_refused(velocity, sound_speed):
+def test_cold_gas_is_accepted(velocity, sound_speed):
     gap = resolution.largest_gap(gas(velocity), 0.3, np.full(4, sound_speed))
     assert gap.ratio < 1e-14
 
 
-def test_a_dense_cloud_far_from_0_is_found_among_others(simulate):
+def test_dense_cloud_far_from_origin_is_found(simulate):
     """Each particle is measured by its own spacing, not by a mean or a median."""
     particles = gas([0.0, 0.0, 0.0, 0.0])
     gap = resolution.largest_gap(particles, np.array([1.0, 1.0, 1e-13, 1.0]), np.ones(4))
@@ -129,7 +129,7 @@ def test_a_dense_cloud_far_from_0_is_found_among_others(simulate):
     assert gap.ratio > resolution.REFUSED
 
 
-def test_gaps_are_those_of_the_largest_component_and_of_velocities_beside_the_median():
+def test_gaps_from_largest_component_and_median_velocity():
     """Of three particles: y at 2^20, whose gap is 2^-32, and speeds about a median of 2^10."""
     particles = SimpleNamespace(
         mass=np.ones(3),
@@ -145,8 +145,8 @@ def test_gaps_are_those_of_the_largest_component_and_of_velocities_beside_the_me
 
 
 @pytest.fixture
-def far(monkeypatch):
-    """far(kind, ratio): a simulation whose last particle has that gap over its scale."""
+def simulation_with_gap(monkeypatch):
+    """A function of kind and ratio: a simulation whose last particle has this gap over scale."""
 
     def made(kind, ratio):
         gap = resolution.Gap(kind, 2, ratio * 8.0, 8.0)
@@ -167,8 +167,8 @@ def far(monkeypatch):
         ("velocity", "(-3, -6)", "the speed of sound (8)", "bulk velocity"),
     ],
 )
-def test_words_name_the_particle_its_gap_and_what_it_is_a_share_of(far, kind, place, words, remedy):
-    simulation = far(kind, 2e-3)
+def test_message_names_particle_gap_and_scale(simulation_with_gap, kind, place, words, remedy):
+    simulation = simulation_with_gap(kind, 2e-3)
     with pytest.raises(NumericalError) as caught:
         resolution.check(simulation)
     assert caught.value.particle == 9
@@ -183,24 +183,22 @@ def test_words_name_the_particle_its_gap_and_what_it_is_a_share_of(far, kind, pl
 
 
 @pytest.mark.parametrize("kind", ["position", "velocity"])
-def test_the_thresholds_are_those_of_the_ratio(far, kind):
+def test_thresholds_apply_to_ratio(simulation_with_gap, kind):
     for ratio, is_refused in ((2.1e-4, True), (1.9e-4, False)):
-        simulation = far(kind, ratio)
+        simulation = simulation_with_gap(kind, ratio)
         if is_refused:
             with pytest.raises(NumericalError):
                 resolution.check(simulation)
         else:
             resolution.check(simulation)
-    assert resolution.doubt(far(kind, 2.1e-7)) is not None
-    assert resolution.doubt(far(kind, 1.9e-7)) is None
+    assert resolution.doubt(simulation_with_gap(kind, 2.1e-7)) is not None
+    assert resolution.doubt(simulation_with_gap(kind, 1.9e-7)) is None
 
 
 @pytest.mark.parametrize(("dimension", "gap", "is_refused"), [
     (2, 2.0**-15, True), (2, 2.0**-16, False), (3, 2.0**-14, True), (3, 2.0**-15, False),
 ])  # fmt: skip
-def test_before_there_are_supports_the_spacing_is_what_the_box_holds_on_average(
-    dimension, gap, is_refused
-):
+def test_spacing_before_supports_is_box_average(dimension, gap, is_refused):
     """64 particles in a box of 1: spacings of 1/8 and 1/4, of which 2e-4 is 2^-15.3 and 2^-14.3."""
     place = gap * 2.0**52
     domain = SimpleNamespace(box=np.array([[place, place + 1.0]] * dimension))
@@ -218,7 +216,7 @@ def test_before_there_are_supports_the_spacing_is_what_the_box_holds_on_average(
         resolution.check_extent(simulation)
 
 
-def test_spacings_are_supports_over_their_number_of_spacings():
+def test_spacing_is_support_over_spacings_per_support():
     """H is 4 spacings; a particle without a support has an error of its own."""
     eos = SimpleNamespace(
         pressure=lambda density, energy: density * energy,
@@ -239,13 +237,13 @@ def test_spacings_are_supports_over_their_number_of_spacings():
 
 
 @pytest.mark.parametrize("none", [0.0, np.nan])
-def test_gas_without_sound_does_not_hide_other_gas(none):
+def test_zero_sound_speed_does_not_hide_other_particles(none):
     sound_speed = np.array([none, none, 1e-10, 1.0])
     gap = resolution.largest_gap(gas([8.0] * 4), 0.3, sound_speed)
     assert gap == ("velocity", 2, 2.0**-49, 1e-10)
 
 
-def test_a_place_that_is_not_a_number_does_not_hide_others():
+def test_nan_position_does_not_hide_other_particles():
     particles = gas([0.0] * 4)
     particles.position = np.array([[np.nan, 1.0, 2.0**20, 1.0]])
     gap = resolution.largest_gap(particles, 0.25, 1.0)

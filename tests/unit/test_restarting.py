@@ -74,7 +74,7 @@ def files(directory):
     ],
 )
 @pytest.mark.parametrize("elsewhere", [False, True])
-def test_a_restart_without_a_step_to_do_changes_nothing(
+def test_restart_of_finished_run_changes_nothing(
     run, tmp_path, which, settings, code, words, elsewhere
 ):
     source = run.path if which == "run" else run.checkpoint_path(2)
@@ -91,7 +91,7 @@ def test_a_restart_without_a_step_to_do_changes_nothing(
     assert not (tmp_path / "new").exists()
 
 
-def test_an_end_that_an_earlier_checkpoint_has_reached_is_no_step_either(run, tmp_path):
+def test_restart_to_earlier_end_changes_nothing(run, tmp_path):
     before = files(run.path)
     result = sph_("restart", run.checkpoint_path(1), "--set", "time.end=0.01")
     assert result.exit_code == 2
@@ -99,7 +99,7 @@ def test_an_end_that_an_earlier_checkpoint_has_reached_is_no_step_either(run, tm
     assert files(run.path) == before
 
 
-def test_a_run_killed_before_its_summary_gets_it(run):
+def test_restart_of_run_killed_before_summary_writes_summary(run):
     before = json.loads(run.summary.read_text())
     kept = files(run.path / "checkpoints")
     run.summary.unlink()
@@ -115,7 +115,7 @@ def test_a_run_killed_before_its_summary_gets_it(run):
 
 
 @pytest.mark.parametrize("text", ["[" * 100_000, "[]", '{"status": ["done"]}', "\xff"])
-def test_a_summary_that_is_damaged_is_written_anew(run, text):
+def test_restart_rewrites_damaged_summary(run, text):
     run.summary.write_text(text, encoding="latin-1")
     result = sph_("restart", run.path)
     assert result.exit_code == 0, result.output
@@ -123,7 +123,7 @@ def test_a_summary_that_is_damaged_is_written_anew(run, text):
 
 
 @pytest.mark.parametrize("name", ["config.toml", "summary.json"])
-def test_a_pipe_in_a_received_directory_is_not_waited_for(run, name):
+def test_restart_does_not_wait_for_pipe_in_directory(run, name):
     (run.path / name).unlink()
     os.mkfifo(run.path / name)
     result = sph_("restart", run.path, "--set", "time.end=0.025")
@@ -131,14 +131,14 @@ def test_a_pipe_in_a_received_directory_is_not_waited_for(run, name):
     assert (run.path / name).is_file()
 
 
-def test_a_link_to_itself_is_no_run_directory(run, tmp_path):
+def test_restart_of_link_to_itself_is_refused(run, tmp_path):
     (tmp_path / "loop").symlink_to("loop")
     result = sph_("restart", run.path, "--set", "time.end=0.025", "-o", tmp_path / "loop")
     assert result.exit_code == 4, result.output
     assert "loop" in result.stderr
 
 
-def test_only_the_last_checkpoint_stands_for_a_missing_summary(run):
+def test_missing_summary_written_only_from_last_checkpoint(run):
     """Of a run that was taken further, an earlier end is no reason to drop what came later."""
     ended = run.checkpoint_path(2).read_bytes()
     assert sph_("restart", run.path, "--set", "time.end=0.03").exit_code == 0
@@ -151,7 +151,7 @@ def test_only_the_last_checkpoint_stands_for_a_missing_summary(run):
     assert files(run.path) == before
 
 
-def test_the_last_checkpoint_of_a_run_that_failed_later_closes_it_again(run):
+def test_restart_of_failed_run_to_last_checkpoint_finishes_it(run):
     """An attempt to go on has failed: the summary is of that, and not of the last checkpoint."""
     far = ["--set", "time.end=0.1", "--set", "physics.max_energy_drift=1e-12"]
     assert sph_("restart", run.path, *far).exit_code == 3
@@ -160,7 +160,7 @@ def test_the_last_checkpoint_of_a_run_that_failed_later_closes_it_again(run):
     assert (found["status"], found["time"]) == ("done", 0.02)
 
 
-def test_settings_changed_on_the_way_are_told(run, tmp_path):
+def test_restart_with_changed_settings_is_reported(run, tmp_path):
     first = sph_("restart", run.path, "--set", "time.end=0.03")
     assert first.exit_code == 0, first.output
     assert "Settings changed" not in first.stdout
@@ -182,7 +182,7 @@ def test_settings_changed_on_the_way_are_told(run, tmp_path):
     assert f"changed its settings in restarts: {told}." in said
 
 
-def test_a_config_that_is_not_the_checkpoints_is_told(run):
+def test_restart_with_edited_config_file_is_noted(run):
     """Edited by hand, or left by a restart that was killed before its first checkpoint."""
     text = run.config.read_text()
     assert "alpha = 1.0" in text
@@ -200,7 +200,7 @@ SETTINGS = ("--set", "time.end=0.03", "--set", "physics.alpha=2.0", "--set", "ph
 
 
 @pytest.mark.parametrize("killed_in", ["write_config", "resume", "advance"])
-def test_a_restart_that_is_killed_has_recorded_its_settings(run, tmp_path, monkeypatch, killed_in):
+def test_killed_restart_has_recorded_settings(run, tmp_path, monkeypatch, killed_in):
     """Or none of them: what goes on from there is the whole restart, to the last bit."""
     whole = RunDirectory(shutil.copytree(run.path, tmp_path / "whole"))
     assert sph_("restart", whole.path, *SETTINGS).exit_code == 0
@@ -253,9 +253,7 @@ def place(tmp_path):
         ('{"status": "done", "time": 0.25}', 2, True),
     ],
 )
-def test_a_summary_is_missing_where_the_last_checkpoint_has_none_of_its_own(
-    place, summary, number, expected
-):
+def test_summary_of_earlier_checkpoint_counts_as_missing(place, summary, number, expected):
     if summary is not None:
         place.summary.write_text(summary)
     path = place.checkpoint_path(number)
@@ -266,7 +264,7 @@ def test_a_summary_is_missing_where_the_last_checkpoint_has_none_of_its_own(
 @pytest.mark.parametrize(
     ("has_failed", "why"), [(True, "energy has drifted"), (False, "cannot be read")]
 )
-def test_checkpoints_after_the_good_one_are_told_with_their_reason(place, has_failed, why):
+def test_skipped_checkpoints_are_reported_with_reason(place, has_failed, why):
     if has_failed:
         place.write_summary({"status": "failed"})
     notes = []
@@ -277,7 +275,7 @@ def test_checkpoints_after_the_good_one_are_told_with_their_reason(place, has_fa
     assert "checkpoint_000001.h5" in note
 
 
-def test_settings_of_a_file_that_are_not_used_are_told_but_for_threads(place):
+def test_unused_file_settings_are_noted_except_threads(place):
     before = configuration.from_text(TUBE)
     notes = []
 
@@ -300,7 +298,7 @@ def test_settings_of_a_file_that_are_not_used_are_told_but_for_threads(place):
     assert told([], "physics.alpha=3.0") == 0  # the file has what the checkpoint has
 
 
-def test_a_new_place_gets_the_history_and_the_checkpoints_up_to_the_one(place, tmp_path):
+def test_restart_into_new_directory_copies_history_and_checkpoints(place, tmp_path):
     path = place.checkpoint_path(1)
     target, number = restarting._place_to_go_on(place, path, tmp_path / "new")
     assert number == 1
@@ -313,7 +311,7 @@ def test_a_new_place_gets_the_history_and_the_checkpoints_up_to_the_one(place, t
     assert not target.history.exists()
 
 
-def test_a_coming_step_obeys_a_new_courant_number_and_a_new_limit_together():
+def test_first_step_follows_new_courant_number_and_limit():
     before = configuration.from_text(TUBE).override(["physics.energy_limit=false"])
     now = before.override(["physics.C=0.075", "physics.energy_limit=true"])
     # 0.75 is the least of u/|du/dt|; gas without any energy sets none

@@ -232,7 +232,7 @@ def tube(tmp_path_factory):
         (3e-9, 1e-9, [1e-9, 2e-9, 3e-9]),
     ],
 )
-def test_output_times(end, interval, times):
+def test_output_times_from_interval_and_end(end, interval, times):
     assert list(output_times(end, interval)) == times
 
 
@@ -247,15 +247,15 @@ def test_output_times(end, interval, times):
         (0.25, []),
     ],
 )
-def test_output_times_that_are_left(after, times):
+def test_output_times_remaining_after_restart(after, times):
     assert list(output_times(0.25, 0.1, after)) == times
 
 
-def test_times_of_an_earlier_end_are_those_of_a_later_one():
+def test_output_times_of_earlier_end_are_prefix():
     assert list(output_times(0.3, 0.1)) == list(output_times(0.6, 0.1))[:3]
 
 
-def test_checkpoints_are_at_the_output_times_and_history_has_every_step(uninterrupted):
+def test_checkpoints_at_output_times_and_history_every_step(uninterrupted):
     run, config = uninterrupted.run, configuration.from_text(uninterrupted.text)
     times = [0.0, *output_times(config.time.end, config.output.interval)]
     assert [float(state(path)["time"]) for path in run.checkpoints()] == times
@@ -274,7 +274,7 @@ def test_checkpoints_are_at_the_output_times_and_history_has_every_step(uninterr
     assert np.sum(taken < allowed * (1 - 1e-9)) <= 4
 
 
-def test_history_agrees_with_the_checkpoint(tube):
+def test_history_matches_checkpoint(tube):
     last, row = state(tube.checkpoint_path(4)), rows(tube)[-1]
     kinetic = 0.5 * np.sum(last["mass"] * last["velocity"] ** 2)
     # sums of 60 numbers in another order
@@ -290,7 +290,7 @@ def test_history_agrees_with_the_checkpoint(tube):
 
 
 @pytest.mark.parametrize("number", [0, 1, 3])
-def test_restart_continues_bit_for_bit_on_two_threads(uninterrupted, number, tmp_path):
+def test_restart_on_two_threads_is_bit_for_bit(uninterrupted, number, tmp_path):
     run = copy(uninterrupted.run, tmp_path / "run")
     path = run.checkpoint_path(number)
     go_on(path, "run.threads=2")
@@ -298,7 +298,7 @@ def test_restart_continues_bit_for_bit_on_two_threads(uninterrupted, number, tmp
     assert_same_from(int(state(path)["step"]), run, uninterrupted.run)
 
 
-def test_a_later_end_continues_bit_for_bit(uninterrupted, tmp_path):
+def test_restart_to_later_end_is_bit_for_bit(uninterrupted, tmp_path):
     config = configuration.from_text(uninterrupted.text)
     half = f"time.end={config.time.end / 2}"
     run = RunDirectory.create(tmp_path / "run")
@@ -309,7 +309,7 @@ def test_a_later_end_continues_bit_for_bit(uninterrupted, tmp_path):
     assert_same_from(0, run, uninterrupted.run)
 
 
-def test_a_stop_between_outputs_and_builds_of_lists_continues_bit_for_bit(uninterrupted, tmp_path):
+def test_restart_after_stop_between_outputs_is_bit_for_bit(uninterrupted, tmp_path):
     run = RunDirectory.create(tmp_path / "run")
 
     def in_the_life_of_lists(simulation):
@@ -336,7 +336,7 @@ def test_a_stop_between_outputs_and_builds_of_lists_continues_bit_for_bit(uninte
     assert len(run.checkpoints()) == len(uninterrupted.run.checkpoints()) + 1
 
 
-def test_the_runs_of_the_tests_differ_from_step_to_step(uninterrupted):
+def test_restart_test_runs_change_every_step(uninterrupted):
     """What makes the comparisons above mean something."""
     paths = uninterrupted.run.checkpoints()
     same = {"id", "mass", "alpha", "alpha_rate", "list_skin", "energy_injected", "energy_added",
@@ -345,7 +345,7 @@ def test_the_runs_of_the_tests_differ_from_step_to_step(uninterrupted):
         assert set(state(one)) - same - set(differences(one, other)) == set()
 
 
-def test_a_summary_is_what_its_type_says(tube):
+def test_summary_matches_its_type(tube):
     """Names and types of the figures: the type is what every reader goes by."""
     text = tube.summary.read_text()
     found = of_json(text)
@@ -358,7 +358,7 @@ def test_a_summary_is_what_its_type_says(tube):
         assert list(norms) == list(Norms.__annotations__)
 
 
-def test_costs_add_up_over_sessions(tube, tmp_path):
+def test_cost_adds_up_over_sessions(tube, tmp_path):
     run = copy(tube, tmp_path / "run")
     go_on(run.checkpoint_path(2))
     with run.history.open(newline="") as file:
@@ -374,7 +374,7 @@ def test_costs_add_up_over_sessions(tube, tmp_path):
 # --- where a restart goes on ------------------------------------------------------------------
 
 
-def test_later_checkpoints_are_replaced(tube, tmp_path):
+def test_restart_from_earlier_checkpoint_replaces_later_ones(tube, tmp_path):
     run = copy(tube, tmp_path / "run")
     go_on(run.checkpoint_path(1), "time.end=0.12", "physics.alpha=2.0")
     assert numbers(run) == [f"checkpoint_{k:06d}.h5" for k in range(4)]
@@ -387,7 +387,7 @@ def test_later_checkpoints_are_replaced(tube, tmp_path):
     assert "restarted at step" in checkpoints.read(run.checkpoint_path(3)).lineage[-1]
 
 
-def test_into_a_new_directory(tube, tmp_path):
+def test_restart_into_new_directory_keeps_original(tube, tmp_path):
     before = files(tube.path)
     run = go_on(tube.checkpoint_path(2), into=tmp_path / "new" / "run")
     assert run.path == tmp_path / "new" / "run"
@@ -399,7 +399,7 @@ def test_into_a_new_directory(tube, tmp_path):
     go_on(run.path, "time.end=0.21")  # and that is a run directory like any other
 
 
-def test_a_lone_checkpoint(tube, tmp_path):
+def test_restart_checkpoint_without_run_needs_output_directory(tube, tmp_path):
     lone = shutil.copy(tube.checkpoint_path(2), tmp_path / "lone.h5")
     with pytest.raises(FileError, match=r"not in a run directory.*\n.*-o DIR"):
         go_on(tmp_path / "lone.h5")
@@ -424,7 +424,7 @@ def without_budget(path):
         assert file["Checkpoint"].attrs["format_version"] == 1
 
 
-def test_a_lone_checkpoint_without_its_budget_measures_the_drift_anew(tube, tmp_path):
+def test_restart_without_budget_and_history_measures_drift_anew(tube, tmp_path):
     lone = shutil.copy(tube.checkpoint_path(2), tmp_path / "lone.h5")
     without_budget(tmp_path / "lone.h5")
     run = go_on(tmp_path / "lone.h5", into=tmp_path / "run")
@@ -436,7 +436,7 @@ def test_a_lone_checkpoint_without_its_budget_measures_the_drift_anew(tube, tmp_
     assert first["energy_drift"] == "0.0"
 
 
-def test_a_failed_run_goes_on_from_before_its_energy_drifted(tube, tmp_path):
+def test_failed_run_restarts_from_before_energy_drift(tube, tmp_path):
     """What goes wrong is found some steps later: a checkpoint in between holds it already."""
     run = copy(tube, tmp_path / "run")
     for number, drift in ((2, 4e-4), (3, -6e-4), (4, 4e-3)):  # a tenth of 0.5 % is good enough
@@ -449,7 +449,7 @@ def test_a_failed_run_goes_on_from_before_its_energy_drifted(tube, tmp_path):
     assert find(run.path)[1] == run.checkpoint_path(1)
 
 
-def test_a_damaged_last_checkpoint_is_passed_over_and_named(tube, tmp_path):
+def test_restart_skips_damaged_last_checkpoint_and_names_it(tube, tmp_path):
     run = copy(tube, tmp_path / "run")
     whole = run.checkpoint_path(4).read_bytes()
     run.checkpoint_path(4).write_bytes(whole[: len(whole) // 2])
@@ -464,7 +464,7 @@ def test_a_damaged_last_checkpoint_is_passed_over_and_named(tube, tmp_path):
     assert_same_from(-1, run, tube)
 
 
-def test_nothing_is_said_of_damage_where_there_is_none(tube, tmp_path):
+def test_restart_without_damage_reports_none(tube, tmp_path):
     progress = Watch()
     run = copy(tube, tmp_path / "run")
     go_on(run.checkpoint_path(2), progress=progress)
@@ -472,7 +472,7 @@ def test_nothing_is_said_of_damage_where_there_is_none(tube, tmp_path):
     assert not [note for note in progress.notes if "cannot be read" in note]
 
 
-def test_an_old_summary_does_not_outlive_a_restart(tube, tmp_path):
+def test_restart_removes_old_summary(tube, tmp_path):
     run = copy(tube, tmp_path / "run")
     seen = []
     watch = Watch(at_step=lambda simulation: seen.append(run.summary.exists()))
@@ -495,9 +495,7 @@ def test_an_old_summary_does_not_outlive_a_restart(tube, tmp_path):
         (["problem.n=61", "time.end=0.1"], r"(?s)problem\.n.*time\.end"),
     ],
 )
-def test_what_a_restart_cannot_change_is_refused_before_anything_is(
-    tube, tmp_path, overrides, message
-):
+def test_restart_refused_change_leaves_run_unchanged(tube, tmp_path, overrides, message):
     before = files(tube.path)
     for into in (None, tmp_path / "new"):
         with pytest.raises(ConfigError, match=message):
@@ -543,7 +541,7 @@ threads = 1
 """
 
 
-def test_particles_held_are_told_at_the_start_and_counted_in_every_step(tmp_path, tube):
+def test_limited_supports_reported_at_start_and_counted_each_step(tmp_path, tube):
     watch = Watch()
     run = start(ALONE, tmp_path / "run", watch)
     said = (
@@ -565,7 +563,7 @@ HEATED = TUBE + "[physics]\nheating = { name = 'relaxation', energy = 20.0, time
     [ALONE, LIQUID, HEATED, PULLED],
     ids=["held support", "stiffened gas", "heating", "external field"],
 )
-def test_what_few_scenes_have_continues_bit_for_bit(tmp_path, text):
+def test_restart_of_rare_options_is_bit_for_bit(tmp_path, text):
     whole = start(text, tmp_path / "whole")
     part = copy(whole, tmp_path / "part")
     go_on(part.checkpoint_path(1))
@@ -583,7 +581,7 @@ def rewritten(run, row, column, change):
 
 
 @pytest.mark.parametrize("text", [TUBE, HEATED, PULLED], ids=["plain", "heating", "field"])
-def test_a_checkpoint_without_its_budget_goes_on_by_the_history(tmp_path, text):
+def test_restart_without_budget_continues_by_history(tmp_path, text):
     whole = start(text, tmp_path / "whole")
     part = copy(whole, tmp_path / "part")
     without_budget(part.checkpoint_path(1))
@@ -603,7 +601,7 @@ def budgeted(run, number, **changed):
     checkpoints.write(path, dataclasses.replace(read, budget=read.budget._replace(**changed)))
 
 
-def test_a_restart_counts_energy_from_the_start_of_the_run(tube, tmp_path):
+def test_restart_measures_energy_drift_from_start_of_run(tube, tmp_path):
     """What the run began with, and what was injected until then: both are in the checkpoint."""
     run = copy(tube, tmp_path / "injected")
     budgeted(run, 2, injected=0.25)
@@ -618,7 +616,7 @@ def test_a_restart_counts_energy_from_the_start_of_the_run(tube, tmp_path):
         go_on(run.checkpoint_path(2))
 
 
-def test_a_restart_without_a_budget_counts_energy_by_the_history(tube, tmp_path):
+def test_restart_without_budget_measures_energy_drift_by_history(tube, tmp_path):
     run = copy(tube, tmp_path / "injected")
     without_budget(run.checkpoint_path(2))
     step = int(state(run.checkpoint_path(2))["step"])
@@ -636,7 +634,7 @@ def test_a_restart_without_a_budget_counts_energy_by_the_history(tube, tmp_path)
     ("before", "after", "evolves"),
     [("morris_monaghan", "cullen_dehnen", False), ("cullen_dehnen", "morris_monaghan", True)],
 )
-def test_a_restart_may_take_another_switch_of_viscosity(tmp_path, before, after, evolves):
+def test_restart_with_other_viscosity_switch_is_accepted(tmp_path, before, after, evolves):
     def alpha(switch):
         return f'physics.alpha={{ min = 0.1, max = 2.0, switch = "{switch}" }}'
 
@@ -654,20 +652,20 @@ def test_a_restart_may_take_another_switch_of_viscosity(tmp_path, before, after,
 # --- stops ------------------------------------------------------------------------------------
 
 
-def test_a_stop_at_an_output_writes_no_second_checkpoint(tmp_path):
+def test_stop_at_output_writes_no_second_checkpoint(tmp_path):
     watch = Watch(at_checkpoint=lambda path: interrupt() if "000001" in path.name else None)
     with pytest.raises(Stopped, match="checkpoint_000001"):
         start(TUBE, tmp_path / "run", watch)
     assert numbers(RunDirectory(tmp_path / "run"))[-1] == "checkpoint_000001.h5"
 
 
-def test_a_run_leaves_the_handlers_of_signals_as_they_were(tmp_path):
+def test_run_restores_signal_handlers(tmp_path):
     before = signal.getsignal(signal.SIGINT), signal.getsignal(signal.SIGTERM)
     start(TUBE.replace("end = 0.2", "end = 0.002"), tmp_path / "run")
     assert (signal.getsignal(signal.SIGINT), signal.getsignal(signal.SIGTERM)) == before
 
 
-def test_a_stop_before_the_first_step_keeps_the_initial_state(tmp_path, tube):
+def test_stop_before_first_step_keeps_initial_state(tmp_path, tube):
     with pytest.raises(Stopped, match="checkpoint_000000"):
         start(TUBE, tmp_path / "run", Watch(at_note=interrupt))
     run = RunDirectory(tmp_path / "run")
@@ -676,7 +674,7 @@ def test_a_stop_before_the_first_step_keeps_the_initial_state(tmp_path, tube):
     assert_same_from(-1, run, tube)
 
 
-def test_a_stop_before_the_first_step_of_a_restart(tube, tmp_path):
+def test_stop_before_first_step_of_restart_keeps_checkpoint(tube, tmp_path):
     run = copy(tube, tmp_path / "run")
     run.checkpoint_path(4).write_bytes(b"")
     with pytest.raises(Stopped, match="checkpoint_000003"):
@@ -686,7 +684,7 @@ def test_a_stop_before_the_first_step_of_a_restart(tube, tmp_path):
     assert_same_from(-1, run, tube)
 
 
-def test_a_second_signal_acts_at_once_and_handlers_come_back(tmp_path):
+def test_second_signal_ends_at_once_and_restores_handlers(tmp_path):
     handler = signal.signal(signal.SIGINT, signal.default_int_handler)
     before = signal.getsignal(signal.SIGINT), signal.getsignal(signal.SIGTERM)
 
@@ -724,7 +722,7 @@ interval = 0.006
 """
 
 
-def test_a_numerical_failure_names_the_particle_and_the_way_on(tmp_path, recwarn):
+def test_numerical_failure_names_particle_and_restart_command(tmp_path, recwarn):
     run = RunDirectory.create(tmp_path / "run")
     with pytest.raises(NumericalError) as caught:
         runner.run(configuration.from_text(STRONG), run, Watch())
@@ -750,7 +748,7 @@ def test_a_numerical_failure_names_the_particle_and_the_way_on(tmp_path, recwarn
     assert numbers(run) == [f"checkpoint_{k:06d}.h5" for k in range(3)]
 
 
-def test_a_failure_on_a_full_disk_is_told_with_its_offenders(tmp_path, monkeypatch):
+def test_numerical_failure_on_full_disk_is_reported(tmp_path, monkeypatch):
     """Exit code 3 and what broke, although neither history nor summary can be written any more."""
     run = RunDirectory.create(tmp_path / "run")
     flush, checkpoints_written = History.flush, []
@@ -773,7 +771,7 @@ def test_a_failure_on_a_full_disk_is_told_with_its_offenders(tmp_path, monkeypat
     )
 
 
-def test_the_first_step_of_a_restart_obeys_what_was_changed(tube, tmp_path):
+def test_first_step_of_restart_follows_changed_settings(tube, tmp_path):
     step = float(rows(tube)[-1]["dt"])
     held = 1 / (16 + np.sqrt(4 + 16**2))  # by alpha = 16, of 0.15
     for changed, expected in [
@@ -788,7 +786,7 @@ def test_the_first_step_of_a_restart_obeys_what_was_changed(tube, tmp_path):
         assert float(then["t"]) - 0.2 == pytest.approx(expected, abs=1e-16)
 
 
-def test_the_energy_limit_holds_from_the_first_step_of_a_restart(tmp_path):
+def test_energy_limit_applies_from_first_step_of_restart(tmp_path):
     free = STRONG.replace("max_energy_drift = 1e-15", "energy_limit = false")
     run = start(free.replace("end = 0.012", "end = 0.0005"), tmp_path / "run")
     last = state(run.checkpoints()[-1])
@@ -799,7 +797,7 @@ def test_the_energy_limit_holds_from_the_first_step_of_a_restart(tmp_path):
     assert then - first == pytest.approx(allowed, rel=1e-9)
 
 
-def test_the_energy_limit_of_a_restart_leaves_gas_without_energy_aside(tmp_path):
+def test_energy_limit_of_restart_ignores_gas_without_energy(tmp_path):
     """Cooling may take u to 0 by rounding. Such a particle sets no step, here as in any step."""
     run = start(TUBE.replace("end = 0.2", "end = 0.05") + "[physics]\nenergy_limit = false\n",
                 tmp_path / "run")  # fmt: skip
@@ -812,7 +810,7 @@ def test_the_energy_limit_of_a_restart_leaves_gas_without_energy_aside(tmp_path)
     assert restarting._coming_step(limited, last) == pytest.approx(min(last.next_step, allowed))
 
 
-def test_a_failure_of_the_first_evaluation_leaves_the_place_where_it_was(tmp_path):
+def test_failure_of_first_evaluation_writes_offender_and_needs_no_force(tmp_path):
     few = TUBE.replace("mirror", "periodic").replace("n = 60", "n = 18")
     few += "[physics]\neta = 5e4\n"
     run = RunDirectory.create(tmp_path / "run")
@@ -829,7 +827,7 @@ def test_a_failure_of_the_first_evaluation_leaves_the_place_where_it_was(tmp_pat
     assert not run.offenders.exists()
 
 
-def test_a_failure_before_anything_is_computed_leaves_the_particle(tmp_path):
+def test_failure_at_start_writes_offending_particle(tmp_path):
     run = RunDirectory.create(tmp_path / "run")
     huge = TUBE.replace("n = 60", "n = 60\nright = { density = 0.125, pressure = 1e150 }")
     with pytest.raises(NumericalError, match="are not known yet") as caught:
@@ -838,7 +836,7 @@ def test_a_failure_before_anything_is_computed_leaves_the_particle(tmp_path):
 
 
 @pytest.mark.slow
-def test_a_directory_in_which_a_run_is_under_way_is_left_alone(tmp_path, tube):
+def test_directory_of_active_run_is_refused(tmp_path, tube):
     run, said = RunDirectory(tmp_path / "run"), []
 
     def others(_):
@@ -863,7 +861,7 @@ def test_a_directory_in_which_a_run_is_under_way_is_left_alone(tmp_path, tube):
 # --- the summary ------------------------------------------------------------------------------
 
 
-def test_summary(uninterrupted):
+def test_summary_matches_run(uninterrupted):
     run, config = uninterrupted.run, configuration.from_text(uninterrupted.text)
     summary = json.loads(run.summary.read_text())
     assert summary["status"] == "done"
@@ -887,7 +885,7 @@ def test_summary(uninterrupted):
     assert any("alpha" in part.split(":")[0] for part in summary["left_out"]) != switched
 
 
-def test_seconds_by_phase_add_up(uninterrupted):
+def test_phase_seconds_add_up(uninterrupted):
     session = json.loads(uninterrupted.run.summary.read_text())["cost"]["session"]
     phases = session["phases_cpu_seconds"]
     assert {"order", "lists", "density", "rates", "output", "predict, correct"} <= set(phases)
@@ -899,7 +897,7 @@ def test_seconds_by_phase_add_up(uninterrupted):
     assert all(seconds >= 0 for seconds in phases.values())
 
 
-def test_errors_where_there_is_an_exact_solution(tube):
+def test_summary_with_exact_solution_has_errors(tube):
     errors = json.loads(tube.summary.read_text())["errors"]
     assert errors["region"] == "the whole domain"
     assert set(errors["fields"]) == {"density", "velocity", "pressure", "internal_energy"}
@@ -917,7 +915,7 @@ def test_errors_where_there_is_an_exact_solution(tube):
     assert found["Linf"] == difference.max()
 
 
-def test_where_there_is_no_exact_solution_the_summary_says_so(uninterrupted):
+def test_summary_without_exact_solution_says_so(uninterrupted):
     found = json.loads(uninterrupted.run.summary.read_text())
     none = found["problem"] == "kelvin_helmholtz"
     assert (found["errors"] is None) == none
@@ -926,7 +924,7 @@ def test_where_there_is_no_exact_solution_the_summary_says_so(uninterrupted):
     assert (words in in_words(found)) == none
 
 
-def test_errors_end_when_waves_have_met_the_walls_and_after_a_restart_too(tube, tmp_path):
+def test_summary_after_waves_meet_walls_has_no_errors(tube, tmp_path):
     longer = start(TUBE.replace("end = 0.2", "end = 0.3"), tmp_path / "longer")
     again = go_on(copy(tube, tmp_path / "again").path, "time.end=0.3")
     for run in (longer, again):
@@ -944,7 +942,7 @@ def test_errors_end_when_waves_have_met_the_walls_and_after_a_restart_too(tube, 
     assert "plateau_left_density_error" in before["report"]
 
 
-def test_errors_are_told_beside_the_size_of_the_field(tube):
+def test_summary_has_errors_and_field_norms(tube):
     found = json.loads(tube.summary.read_text())
     density = found["errors"]["fields"]["density"]
     share = density["L1"] / density["relative_L1"]  # the mean density by volume
@@ -952,7 +950,7 @@ def test_errors_are_told_beside_the_size_of_the_field(tube):
     assert f"density {density['L1']:.3g} ({100 * density['relative_L1']:.2g} %)" in in_words(found)
 
 
-def test_the_summary_says_how_near_to_each_other_particles_are(tube):
+def test_summary_has_nearest_distance(tube):
     found = json.loads(tube.summary.read_text())["nearest"]
     last = checkpoints.read(tube.checkpoint_path(4))
     assert last.config.problem.boundaries == ("mirror",)
@@ -965,7 +963,7 @@ def test_the_summary_says_how_near_to_each_other_particles_are(tube):
     assert found["smallest"] == pytest.approx(nearest.min(), rel=1e-10)
 
 
-def test_momentum_is_judged_only_where_no_wall_takes_it(uninterrupted):
+def test_summary_momentum_only_without_walls(uninterrupted):
     found = json.loads(uninterrupted.run.summary.read_text())
     change = found["conservation"]["momentum_change"]
     walls = configuration.from_text(uninterrupted.text).problem.boundaries

@@ -59,7 +59,7 @@ def has_pass(phase):
          "finds contacts", "sums pressure", "bounds acceleration", "needs curl",
          "needs divergence", "limits viscosity", "adds energy", "is filled"],
 )  # fmt: skip
-def test_a_property_holds_where_something_asks_for_it(holds, there, absent):
+def test_scene_property_set_only_where_needed(holds, there, absent):
     assert [holds(scene(*overrides)) for overrides in there] == [True] * len(there)
     assert [holds(scene(*overrides)) for overrides in absent] == [False] * len(absent)
 
@@ -81,13 +81,13 @@ EVERY = {
         ([FIELD, HEATING, STILL], set()),
     ],
 )
-def test_a_checkpoint_stores_what_a_step_begins_with_and_no_work_arrays(overrides, stored):
+def test_checkpoint_stores_start_of_step_without_work_arrays(overrides, stored):
     fields = scene(*overrides).fields
     assert {field.name for field in fields if field.stored} == EVERY | stored
     assert len({field.name for field in fields}) == len(fields)  # each has one owner
 
 
-def test_gas_that_does_not_fill_its_box_has_no_volume_to_be():
+def test_scene_with_vacuum_has_no_expected_volume():
     closed = configuration.from_text('[problem]\nname = "noh"\nn = 50\n')
     assert set(closed.problem.boundaries) == {"mirror"}
     assert not Scene(closed).is_filled
@@ -102,7 +102,7 @@ def test_gas_that_does_not_fill_its_box_has_no_volume_to_be():
         ([FIELD], [0.0, 0.0]),
     ],
 )
-def test_momentum_is_kept_along_axes_without_walls_where_no_field_pulls(overrides, kept):
+def test_scene_momentum_conserved_without_walls_and_field(overrides, kept):
     np.testing.assert_array_equal(scene(*overrides).keeps_momentum, kept)
 
 
@@ -110,13 +110,13 @@ def test_momentum_is_kept_along_axes_without_walls_where_no_field_pulls(override
     ("boundary", "expected"),
     [("'open'", 6.0), ("['periodic', 'open']", math.inf), ("['open', 'mirror']", math.inf)],
 )
-def test_supports_are_held_where_every_axis_is_open(boundary, expected):
+def test_scene_all_axes_open_limits_supports(boundary, expected):
     domain = "problem.domain=[[0.0, 1.0], [0.0, 2.0]]"
     found = scene(domain, f"problem.boundary={boundary}", "physics.max_support=3.0")
     assert found.max_support == found.formulation.models.max_support == expected
 
 
-def test_the_models_are_those_that_were_asked_for():
+def test_scene_models_match_configuration():
     plain = scene().formulation.models
     assert plain.smoothing == FixedPasses(2, 1e-10)
     assert isinstance(plain.weighting, ByMass)  # both are equal to ()
@@ -139,7 +139,7 @@ def test_the_models_are_those_that_were_asked_for():
 PARTS = {
     "equation for alpha": [RANGE],
     "gradients of velocity": [SHOCKS],
-    "sum of the pressure": ["physics.scheme=pressure_energy"],
+    "pressure sum over neighbours": ["physics.scheme=pressure_energy"],
     "artificial conductivity": ["physics.conductivity=approach"],
     "switch of conductivity": [CONTACTS],
     "external field": [FIELD],
@@ -155,7 +155,7 @@ WITHOUT = {"switch of conductivity": ["physics.conductivity=approach"]}
 
 
 @pytest.mark.parametrize("part", PARTS)
-def test_a_part_is_in_where_it_is_asked_for_and_else_left_out_with_a_reason(part):
+def test_scene_part_included_or_left_out_with_reason(part):
     inside, outside = scene(*NOTHING, *PARTS[part]).described()
     assert part in inside
     assert not any(one.startswith(f"{part}: ") for one in outside)
@@ -167,7 +167,7 @@ def test_a_part_is_in_where_it_is_asked_for_and_else_left_out_with_a_reason(part
     assert {one.split(": ")[0] for one in scene(*NOTHING).described()[1]} == {*PARTS} - {*WITHOUT}
 
 
-def test_what_every_scene_has_is_named():
+def test_scene_names_parts_always_included():
     inside, outside = scene("problem.boundary=periodic", "physics.density=number").described()
     assert inside[:6] == [
         "2-D, 9 image(s) of the box",

@@ -55,7 +55,7 @@ def fingerprint(simulation):
 
 
 @pytest.mark.parametrize("scheme", ["grad_h", "variational", "pressure_energy"])
-def test_counting_particles_or_their_masses_is_one_where_masses_are_equal(begin, scheme):
+def test_density_by_number_equal_masses_equals_density_by_mass(begin, scheme):
     states = []
     for density in ("mass", "number"):
         simulation = begin(
@@ -76,7 +76,7 @@ def test_counting_particles_or_their_masses_is_one_where_masses_are_equal(begin,
 
 
 @pytest.mark.parametrize("switch", ["morris_monaghan", "cullen_dehnen"])
-def test_two_threads_give_the_bits_of_one(begin, monkeypatch, switch):
+def test_two_threads_equal_one_bit_for_bit(begin, monkeypatch, switch):
     shared = []
     run = Team.run
 
@@ -129,9 +129,7 @@ interval = 1.0
     ],
     ids=["plain", "rate of alpha", "shocks and contacts", "sum of the pressure", "sources"],
 )  # fmt: skip
-def test_what_a_new_order_does_not_carry_along_is_written_before_it_is_read(
-    begin, monkeypatch, overrides
-):
+def test_fields_not_reordered_are_written_before_read(begin, monkeypatch, overrides):
     plain, shuffled = begin(BOX, *overrides), begin(BOX, *overrides)
     reorder = State.reorder
 
@@ -153,7 +151,7 @@ def test_what_a_new_order_does_not_carry_along_is_written_before_it_is_read(
 # --- where a step ends ------------------------------------------------------------------------
 
 
-def test_a_step_is_cut_to_land_on_the_time_asked_for(begin):
+def test_step_cut_to_reach_requested_time(begin):
     simulation = begin(TUBE)
     allowed = simulation.limit.dt
     simulation.advance(0.3 * allowed)
@@ -165,7 +163,7 @@ def test_a_step_is_cut_to_land_on_the_time_asked_for(begin):
     assert simulation.step > 10
 
 
-def test_a_step_is_what_the_criteria_allow(begin):
+def test_step_follows_criteria(begin):
     simulation = begin(TUBE)
     allowed = simulation.limit.dt
     simulation.advance(math.inf)
@@ -175,7 +173,7 @@ def test_a_step_is_what_the_criteria_allow(begin):
 @pytest.mark.parametrize(
     ("short_of", "steps"), [(0.0, 1), (1e-10, 1), (-1e-10, 1), (1e-6, 1), (-1e-6, 2)]
 )
-def test_a_remainder_that_is_rounding_is_no_step_of_its_own(begin, short_of, steps):
+def test_step_remainder_of_round_off_is_no_step(begin, short_of, steps):
     """short_of: by what part of a step the first one would pass the end."""
     simulation = begin(TUBE)
     until = simulation.limit.dt * (1 - short_of)
@@ -184,7 +182,7 @@ def test_a_remainder_that_is_rounding_is_no_step_of_its_own(begin, short_of, ste
     assert (simulation.time, simulation.step) == (until, steps)
 
 
-def test_the_limit_names_its_particle_and_criterion(begin):
+def test_step_limit_names_particle_and_criterion(begin):
     simulation = begin(SHEAR)
     p, limit = simulation.particles, simulation.limit
     i = int(np.flatnonzero(p.id == limit.particle)[0])
@@ -195,7 +193,7 @@ def test_the_limit_names_its_particle_and_criterion(begin):
     assert limit.dt == pytest.approx(0.15 * np.min(2 * p.support / p.signal_speed), rel=4e-16)
 
 
-def test_the_energy_criterion(begin):
+def test_step_limited_by_energy_criterion(begin):
     heating = [
         "problem.left={density=1.0,velocity=5.0,pressure=1.0e-3}",
         "problem.right={density=1.0,velocity=-5.0,pressure=1.0e-3}",
@@ -214,7 +212,7 @@ def test_the_energy_criterion(begin):
 # --- what is measured -------------------------------------------------------------------------
 
 
-def test_totals(begin):
+def test_totals_match_sums_over_particles(begin):
     simulation = begin(SHEAR)
     simulation.advance(math.inf)
     p, totals = simulation.particles, simulation.totals
@@ -240,7 +238,7 @@ def test_totals(begin):
     ("name", "value"),
     [("internal_energy", -1.0), ("internal_energy", np.nan), ("velocity", np.inf)],
 )
-def test_a_bad_particle_is_named(begin, name, value):
+def test_unphysical_particle_is_named(begin, name, value):
     simulation = begin(TUBE, "physics.energy_limit=false")
     simulation.advance(math.inf)  # what a run begins with cannot be helped by smaller steps
     getattr(simulation.particles, name)[..., 7] = value
@@ -253,12 +251,12 @@ def test_a_bad_particle_is_named(begin, name, value):
     assert "Try: a smaller physics.C" in str(caught.value)
 
 
-def test_a_support_that_does_not_fit_the_box_is_refused_at_the_start(begin):
+def test_support_too_large_for_box_is_refused_at_start(begin):
     with pytest.raises(NumericalError, match=r"particle \d+ needs a support radius of .* times"):
         begin(TUBE, "problem.boundary=periodic", "physics.eta=5e4")
 
 
-def test_what_both_halves_of_a_step_inject_is_counted(begin):
+def test_injected_energy_counts_both_half_steps(begin):
     simulation = begin(TUBE)
     (energy,) = simulation.evolved
 

@@ -117,7 +117,7 @@ PHASES = {
 }
 
 
-def test_each_part_of_a_step_is_counted_in_its_own_phase(hollow):
+def test_step_parts_timed_in_own_phase(hollow):
     one = hollow()
     one.begin()
     one.asked = [[0]]  # the first pass over the density asks for wider lists
@@ -131,13 +131,13 @@ def test_each_part_of_a_step_is_counted_in_its_own_phase(hollow):
 @pytest.mark.parametrize(
     "guard", ["Watchdog.check_range", "module.check_extent", "module.check", "Watchdog.check"]
 )
-def test_every_guard_is_asked_before_the_first_step(hollow, guard):
+def test_all_guards_checked_before_first_step(hollow, guard):
     one = hollow()
     one.begin()
     assert guard in one.called
 
 
-def test_energies_add_up_over_the_steps(hollow):
+def test_injected_and_added_energy_add_up_over_steps(hollow):
     one = hollow()
     one.begin()
     p, lost = one.particles, 0.25
@@ -153,7 +153,7 @@ def test_energies_add_up_over_the_steps(hollow):
     assert one.energy_drift == one.energy_added  # as the stand-in of the baseline says
 
 
-def test_steps_and_time_go_on_from_a_checkpoint_and_steps_here_begin_anew(hollow):
+def test_restart_continues_step_and_time_and_resets_session_steps(hollow):
     one = hollow()
     one.begin()
     one.time, one.step = 2.0, 40
@@ -166,7 +166,7 @@ def test_steps_and_time_go_on_from_a_checkpoint_and_steps_here_begin_anew(hollow
     assert one.time == 0.0153
 
 
-def test_a_drift_is_measured_from_the_baseline_without_what_heating_added(hollow):
+def test_energy_drift_excludes_heating(hollow):
     one = hollow()
     one.totals = SimpleNamespace(energy_without_bulk=7.0)
     budget = Budget(injected=3.0, added=2.0, baseline=Baseline.of(1.0, 3.0, 0.0))
@@ -177,7 +177,7 @@ def test_a_drift_is_measured_from_the_baseline_without_what_heating_added(hollow
     assert one.budget == budget  # which the next restart goes on from
 
 
-def test_supports_that_are_held_are_counted_at_every_look(hollow):
+def test_limited_supports_counted_at_every_evaluation(hollow):
     one = hollow()
     one.particles.support[:] = 1.0
     one.particles.support[[3, 5]] = 2.0
@@ -196,7 +196,7 @@ def test_supports_that_are_held_are_counted_at_every_look(hollow):
     assert caught.value.particle == one.particles.id[3]
 
 
-def test_lists_that_are_never_wide_enough_name_their_block(hollow):
+def test_lists_never_wide_enough_name_block(hollow):
     one = hollow()
     one.asked = [[2]] * 1000
     with pytest.raises(NumericalError) as caught:
@@ -205,7 +205,7 @@ def test_lists_that_are_never_wide_enough_name_their_block(hollow):
     assert len(one.asked) == 1000 - simulation.MAX_WIDENINGS
 
 
-def test_the_volume_of_the_particles_is_over_that_of_a_filled_box(hollow):
+def test_volume_ratio_uses_filled_box(hollow):
     one = hollow("problem.domain=[0.0, 2.0]")
     one.totals = SimpleNamespace(volume=3.0)
     assert one.volume_ratio == 0.75
@@ -213,7 +213,7 @@ def test_the_volume_of_the_particles_is_over_that_of_a_filled_box(hollow):
     assert one.volume_ratio is None
 
 
-def test_a_checkpoint_gives_the_next_step_and_no_particle_for_it(hollow):
+def test_restart_next_step_has_no_limiting_particle(hollow):
     whole = hollow()
     whole_baseline = Baseline.at(None, 0.0)  # its stand-in
     scene, particles, clock = whole.scene, whole.particles, whole.clock

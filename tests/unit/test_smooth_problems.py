@@ -36,7 +36,7 @@ def lagrangian_density(state, length=1.0):
 
 @pytest.mark.parametrize("amplitude", [1e-6, 1e-2, 0.1])
 @pytest.mark.parametrize("gas", [MONATOMIC, AIR])
-def test_positions_carry_the_density_of_the_wave(amplitude, gas):
+def test_sound_wave_positions_sample_density(amplitude, gas):
     problem = SoundWave(n=400, amplitude=amplitude)
     state = problem.initial(gas)
     exact = problem.exact(gas, 0.0, state.position)
@@ -49,13 +49,13 @@ def test_positions_carry_the_density_of_the_wave(amplitude, gas):
     assert wave.max() == pytest.approx(amplitude, rel=2 * amplitude + 1e-4)  # to first order
 
 
-def test_the_mass_is_that_of_the_wave():
+def test_sound_wave_mass_matches_density():
     problem = SoundWave(amplitude=0.1)
     # <(1 + a sin/3)^3> = 1 + a^2/6 for gamma = 5/3
     assert problem.initial(MONATOMIC).mass.sum() == pytest.approx(1 + 0.01 / 6, rel=1e-13)
 
 
-def test_initial_wave_is_adiabatic_and_goes_one_way():
+def test_sound_wave_initial_state_adiabatic_and_one_directional():
     state = SoundWave(amplitude=0.05).initial(MONATOMIC)
     v = state.velocity[0]
     c = np.sqrt(MONATOMIC.gamma * (MONATOMIC.gamma - 1.0) * state.internal_energy)
@@ -67,7 +67,7 @@ def test_initial_wave_is_adiabatic_and_goes_one_way():
 
 
 @pytest.mark.parametrize("amplitude", [1e-6, 0.05])
-def test_exact_wave_solves_the_equations(amplitude):
+def test_sound_wave_exact_solution_solves_equations(amplitude):
     problem = SoundWave(amplitude=amplitude)
     x = np.linspace(0.0, 1.0, 50, endpoint=False)
     t, step = 0.7, 1e-4
@@ -90,7 +90,7 @@ def test_exact_wave_solves_the_equations(amplitude):
     assert np.abs(P_t + v * P_x + 5.0 / 3.0 * P * v_x).max() < allowed
 
 
-def test_small_wave_is_back_after_a_period_and_a_steep_one_has_broken():
+def test_sound_wave_small_returns_after_period_and_steep_breaks():
     x = np.linspace(0.0, 1.0, 100)[None]
     small = SoundWave(amplitude=1e-6)
     moved = small.exact(MONATOMIC, 1.0, x)["velocity"] - small.exact(MONATOMIC, 0.0, x)["velocity"]
@@ -105,7 +105,7 @@ def test_small_wave_is_back_after_a_period_and_a_steep_one_has_broken():
     )
 
 
-def test_wave_about_to_break_is_still_found():
+def test_sound_wave_just_before_breaking_has_exact_solution():
     problem = SoundWave(amplitude=0.1)
     time = 0.999 * 10 / (2 * np.pi * 4 / 3)
     x = np.linspace(0.0, 1.0, 1001)[None]
@@ -116,7 +116,7 @@ def test_wave_about_to_break_is_still_found():
 
 
 @pytest.mark.parametrize(("dimension", "kind"), [(2, "cubic"), (2, "hexagonal"), (3, "bcc")])
-def test_wave_is_the_same_across(dimension, kind):
+def test_sound_wave_uniform_across(dimension, kind):
     problem = SoundWave(dimension=dimension, n=4000, lattice=kind, amplitude=1e-2)
     np.testing.assert_array_equal(problem.box[1:], [[-0.0625, 0.0625]] * (dimension - 1))
     state = problem.initial(MONATOMIC)
@@ -124,7 +124,7 @@ def test_wave_is_the_same_across(dimension, kind):
     assert state.mass.sum() == pytest.approx((1 + 1e-4 / 6) / 8 ** (dimension - 1), rel=1e-12)
 
 
-def test_report_tells_floor_damping_and_phase_apart():
+def test_sound_wave_report_separates_floor_damping_and_phase():
     problem = SoundWave(n=1000)
     state = problem.initial(MONATOMIC)
     time = 0.5
@@ -152,7 +152,7 @@ def test_report_tells_floor_damping_and_phase_apart():
 
 
 @pytest.mark.parametrize("keys", [{"amplitude": 0.2}, {"amplitude": 0.0}, {"boundary": "mirror"}])
-def test_impossible_waves_are_refused(keys):
+def test_sound_wave_invalid_keys_are_refused(keys):
     with pytest.raises(ValidationError):
         SoundWave(**keys)
 
@@ -161,7 +161,7 @@ def test_impossible_waves_are_refused(keys):
 
 
 @pytest.mark.parametrize("problem", VORTICES)
-def test_vortex_is_in_balance(problem):
+def test_vortex_initial_state_in_balance(problem):
     radius = np.linspace(0.021, 0.449, 44) * np.diff(problem.box)[0]
     along = np.array([0.6, 0.8])[:, None]
     step = 1e-5
@@ -186,7 +186,7 @@ def test_vortex_turns_anticlockwise(problem):
     assert velocity[1] > 0.2
 
 
-def test_published_points_of_gresho():
+def test_gresho_matches_published_points():
     speed, rise = profile(np.array([0.0, 0.1, 0.2, 0.3, 0.4, 0.6]))
     np.testing.assert_allclose(speed, [0.0, 0.5, 1.0, 0.5, 0.0, 0.0], atol=1e-15)
     outside = 4 * np.log(2) - 2  # 3 + 4 ln 2 less the 5 of the centre
@@ -197,7 +197,7 @@ def test_published_points_of_gresho():
     assert np.all(centre["velocity"] == 0.0)
 
 
-def test_yee_is_isentropic_and_as_deep_as_published():
+def test_yee_isentropic_with_published_depth():
     problem = Yee()
     state = problem.initial(AIR)
     exact = problem.exact(AIR, 0.0, state.position)
@@ -211,7 +211,7 @@ def test_yee_is_isentropic_and_as_deep_as_published():
     np.testing.assert_allclose(state.mass / (10 / 64) ** 2, exact["density"], rtol=1e-12)
 
 
-def test_mach_number_is_that_of_the_fastest_gas():
+def test_gresho_mach_number_of_fastest_gas():
     for mach in (0.1, 0.01):
         fastest = Gresho(mach=mach).exact(AIR, 0.0, np.array([[0.2], [0.0]]))
         speed = np.linalg.norm(fastest["velocity"])
@@ -223,7 +223,7 @@ def test_mach_number_is_that_of_the_fastest_gas():
 
 
 @pytest.mark.parametrize("vortex", [Gresho, Yee])
-def test_vortex_is_carried_through_the_faces(vortex):
+def test_vortex_with_bulk_velocity_crosses_faces(vortex):
     carried = vortex(velocity=[1.0, -0.5])
     at_rest = vortex()
     length = np.diff(carried.box)[0, 0]
@@ -239,7 +239,7 @@ def test_vortex_is_carried_through_the_faces(vortex):
 
 
 @pytest.mark.parametrize("bulk", [[0.0, 0.0], [1.0, 0.5]])
-def test_report_of_gresho_finds_no_error_and_sees_one(bulk):
+def test_gresho_report_exact_profile_has_no_error(bulk):
     problem = Gresho(velocity=bulk)
     state = problem.initial(AIR)
     time = 0.3
@@ -258,7 +258,7 @@ def test_report_of_gresho_finds_no_error_and_sees_one(bulk):
     assert abs(lost["peak_v_phi"]) < 1e-14
 
 
-def test_vortices_refuse_a_box_that_cuts_them():
+def test_vortex_larger_than_box_is_refused():
     with pytest.raises(ValidationError, match=r"expected at least 0\.8 "):
         Gresho(domain=[0.0, 0.7])
     with pytest.raises(ValidationError, match="expected at least 10 "):

@@ -69,7 +69,7 @@ def shell(tmp_path):
         ("new noh | true", 0),
     ],
 )
-def test_what_cannot_be_written_changes_no_exit_code(arguments, code, shell, tmp_path):
+def test_unwritable_streams_keep_exit_code(arguments, code, shell, tmp_path):
     result = shell(arguments)
     assert result.returncode == code, result.stderr
     assert "Traceback" not in result.stderr
@@ -79,7 +79,7 @@ def test_what_cannot_be_written_changes_no_exit_code(arguments, code, shell, tmp
 
 
 @pytest.mark.slow
-def test_a_signal_at_a_run_without_stderr_stops_it_and_spoils_no_file(tmp_path):
+def test_signal_without_stderr_stops_run_and_keeps_files(tmp_path):
     (tmp_path / "tube.toml").write_text(TUBE)
     # a file of the run must not be descriptor 2, to which the signal handler writes
     (tmp_path / "stopping.py").write_text(
@@ -106,7 +106,7 @@ def test_a_signal_at_a_run_without_stderr_stops_it_and_spoils_no_file(tmp_path):
 
 
 @pytest.mark.slow
-def test_a_terminal_that_hangs_up_ends_no_run(tmp_path):
+def test_terminal_hangup_does_not_end_run(tmp_path):
     (tmp_path / "tube.toml").write_text(TUBE)
     terminal, its_end = pty.openpty()
     process = subprocess.Popen(
@@ -123,7 +123,7 @@ def test_a_terminal_that_hangs_up_ends_no_run(tmp_path):
     assert (tmp_path / "run" / "summary.json").exists()
 
 
-def test_a_stream_drops_what_it_cannot_write_and_keeps_the_reason():
+def test_stream_drops_unwritable_text_and_keeps_reason():
     descriptor = os.open("/dev/full", os.O_WRONLY)
     stream = standard_streams._dropping(None, descriptor)
     print("x" * 100_000, file=stream, flush=True)
@@ -133,7 +133,7 @@ def test_a_stream_drops_what_it_cannot_write_and_keeps_the_reason():
     os.close(descriptor)
 
 
-def test_paths_that_are_not_utf8_are_written_as_their_bytes(tmp_path):
+def test_paths_not_utf8_written_as_bytes(tmp_path):
     descriptor = os.open(tmp_path / "out", os.O_WRONLY | os.O_CREAT)
     stream = standard_streams._dropping(None, descriptor)
     print("run-\udcff …", file=stream, flush=True)
@@ -143,7 +143,7 @@ def test_paths_that_are_not_utf8_are_written_as_their_bytes(tmp_path):
 
 
 @pytest.mark.parametrize("encoding", ["ascii", "latin-1"])
-def test_other_encodings_escape_what_they_lack(encoding, tmp_path):
+def test_other_encodings_escape_missing_characters(encoding, tmp_path):
     descriptor = os.open(tmp_path / "out", os.O_WRONLY | os.O_CREAT)
     stream = standard_streams._dropping(io.TextIOWrapper(io.BytesIO(), encoding), descriptor)
     print("\udcff …", file=stream, flush=True)
@@ -152,15 +152,15 @@ def test_other_encodings_escape_what_they_lack(encoding, tmp_path):
     assert (tmp_path / "out").read_bytes() == b"\\udcff \\u2026\n"
 
 
-class Full(io.StringIO):
+class FullStream(io.StringIO):
     def write(self, text):
         raise OSError(28, "No space left on device")
 
 
 @pytest.mark.parametrize("say", [progress.Lines().note, progress.RunLines("points", 2, 0).note])
 @pytest.mark.parametrize("kind", ["full", "closed", "none"])
-def test_notes_of_a_python_caller_are_dropped_too(kind, say, monkeypatch, capsys):
-    stream = {"full": Full(), "closed": io.StringIO(), "none": None}[kind]
+def test_notes_to_python_caller_dropped_when_unwritable(kind, say, monkeypatch, capsys):
+    stream = {"full": FullStream(), "closed": io.StringIO(), "none": None}[kind]
     if kind == "closed":
         stream.close()
     monkeypatch.setattr(sys, "stderr", stream)

@@ -45,7 +45,7 @@ def changed(name, value):
     return json.dumps(content)
 
 
-def test_words_for_numbers_that_json_lacks_are_read_as_numbers():
+def test_non_finite_numbers_are_read_as_floats():
     found = of_json(json.dumps(WRITTEN))
     assert found["errors"]["fields"]["density"] == NORMS | {"Linf": math.inf}
     assert found["report"] == {"peak": -math.inf}
@@ -55,7 +55,7 @@ def test_words_for_numbers_that_json_lacks_are_read_as_numbers():
     assert all(found[name] == WRITTEN[name] for name in same)
 
 
-def test_figures_of_a_newer_version_are_kept():
+def test_unknown_figures_are_kept():
     assert of_json(changed("cost.energy_joules", 5.0))["cost"]["energy_joules"] == 5.0
 
 
@@ -74,7 +74,7 @@ def test_figures_of_a_newer_version_are_kept():
         ("errors.fields.density.L2", ..., "errors.fields.density.L2 is missing"),
     ],
 )
-def test_what_is_wrong_is_named(tmp_path, name, value, words):
+def test_summary_invalid_entry_is_named(tmp_path, name, value, words):
     run = RunDirectory(tmp_path)
     run.summary.write_text(changed(name, value))
     if words is None:
@@ -84,7 +84,7 @@ def test_what_is_wrong_is_named(tmp_path, name, value, words):
         run.whole_summary()
 
 
-def test_figures_are_named_as_problems_name_them():
+def test_figure_names_of_problem_limits_are_found():
     expected = {
         "l1.density": 0.25, "l1.velocity": None, "peak": -math.inf, "energy_drift": 2e-9,
         "energy_injected": 0.0, "nothing": None,
@@ -96,12 +96,12 @@ def test_figures_are_named_as_problems_name_them():
     assert figure(unjudged, "peak") is None
 
 
-def test_a_figure_is_looked_up_by_its_tables():
+def test_figure_is_found_by_its_tables():
     summary = of_json(json.dumps(WRITTEN))
     assert lookup(summary, "cost.session.steps") == 3
     assert lookup(summary, "steps") == 3
     assert lookup(summary, "steps.more") is lookup(summary, "nearest.median") is None
 
 
-def test_wall_clock_time_is_told_without_the_start_of_the_last_session():
+def test_wall_clock_time_excludes_start_of_last_session():
     assert wall_without_start(of_json(json.dumps(WRITTEN))["cost"]) == 9.0 - 4.0 - 0.5

@@ -32,7 +32,7 @@ class Resting(Part):
 
 
 @pytest.mark.parametrize("boost", [0.0, 1e-3, 1.0, 1e3, 1e6])
-def test_kinetic_energy_without_bulk_is_the_same_in_every_frame(boost):
+def test_kinetic_energy_without_bulk_independent_of_frame(boost):
     particles = gas()
     still = totals.of(particles, (), np.ones(2))
     particles.velocity += np.array([[boost], [-0.3 * boost]])
@@ -46,7 +46,7 @@ def test_kinetic_energy_without_bulk_is_the_same_in_every_frame(boost):
     assert still.kinetic_energy_without_bulk == pytest.approx(expected, rel=1e-13)
 
 
-def test_axes_that_do_not_keep_momentum_keep_their_bulk_motion():
+def test_bulk_motion_subtracted_only_on_conserving_axes():
     particles = gas(boost=5.0)
     none = totals.of(particles, (), np.zeros(2))
     assert none.kinetic_energy_without_bulk == pytest.approx(none.kinetic_energy, rel=1e-14)
@@ -56,13 +56,13 @@ def test_axes_that_do_not_keep_momentum_keep_their_bulk_motion():
     assert along_y.kinetic_energy_without_bulk == pytest.approx(expected, rel=1e-13)
 
 
-def test_volume_is_the_sum_of_mass_over_density():
+def test_volume_is_sum_of_mass_over_density():
     particles = gas(dimension=3)
     expected = (particles.mass / particles.density).sum()
     assert totals.of(particles, (), np.ones(3)).volume == pytest.approx(expected, rel=1e-14)
 
 
-def test_every_sum_and_extreme_is_that_of_its_particles():
+def test_sums_and_extremes_match_particles():
     particles = gas(dimension=3)
     particles.acceleration[:] = RANDOM.normal(size=(3, 50))
     particles.energy_rate[:] = RANDOM.normal(size=50)
@@ -91,7 +91,7 @@ def test_every_sum_and_extreme_is_that_of_its_particles():
     assert totals.of(p, (Part(),), np.ones(3)).potential_energy == 0.0
 
 
-def test_a_baseline_in_the_middle_of_a_run_has_drifted_by_nothing():
+def test_baseline_in_middle_of_run_has_zero_drift():
     now = totals.of(gas(), (External(PointMass(2.0, 0.1)),), np.ones(2))
     baseline = Baseline.at(now, added=0.5)
     assert abs(baseline.drift(now, added=0.5)) < 1e-15  # round-off
@@ -108,7 +108,7 @@ def test_a_baseline_in_the_middle_of_a_run_has_drifted_by_nothing():
         (1.0, 0.0, -100.0, 99.0),
     ],
 )
-def test_drift_is_relative_to_what_there_was(kinetic, internal, potential, scale):
+def test_drift_is_relative_to_initial_energy(kinetic, internal, potential, scale):
     baseline = Baseline.of(kinetic, internal, potential)
     now = totals.of(gas(), (), np.ones(2))._replace(
         kinetic_energy_without_bulk=kinetic + 0.3, internal_energy=internal + 0.25,
@@ -118,7 +118,7 @@ def test_drift_is_relative_to_what_there_was(kinetic, internal, potential, scale
     assert baseline.drift(now, added=0.25) == pytest.approx(0.3 / scale, rel=1e-13)
 
 
-def test_gas_without_any_energy_drifts_endlessly_or_not_at_all():
+def test_drift_without_initial_energy_is_infinite_or_zero():
     nothing = Baseline.of(0.0, 0.0, 0.0)
     now = totals.of(gas(), (), np.ones(2))._replace(
         kinetic_energy_without_bulk=0.0, internal_energy=0.0
@@ -144,7 +144,7 @@ interval = 0.5
 
 @pytest.mark.parametrize("boost", [300.0, 3e5])
 @pytest.mark.parametrize("C", [0.15, 1.5])
-def test_a_vortex_that_is_carried_along_drifts_as_it_does_at_rest(simulate, boost, C):
+def test_drift_of_vortex_independent_of_bulk_velocity(simulate, boost, C):
     """A step ten times too long multiplies the vortex's energy; bulk motion made that 3e-4."""
     drifts = []
     for speed in (0.0, boost):

@@ -30,13 +30,13 @@ def tube(x=None, states=(LEFT, RIGHT), time=TIME, **changed):
     return whole._replace(**changed)
 
 
-def test_the_gas_that_collides_is_what_the_tests_below_need():
+def test_colliding_gas_has_states_these_tests_need():
     assert SPEED.left_head == SPEED.left_tail < SPEED.contact < 0.0
     assert SPEED.right_head == SPEED.right_tail
     assert STAR.density_right > max(STAR.density_left, LEFT.density, RIGHT.density)
 
 
-def test_the_peak_is_the_highest_of_all_states():
+def test_peak_density_is_highest_of_all_states():
     assert tube_figures.of(tube())["peak_density_exact"] == STAR.density_right
     mirrored = tuple(one._replace(velocity=-one.velocity) for one in (RIGHT, LEFT))
     found = tube_figures.of(tube(states=mirrored))["peak_density_exact"]
@@ -46,7 +46,7 @@ def test_the_peak_is_the_highest_of_all_states():
     assert tube_figures.of(tube(states=(RIGHT, LEFT)))["peak_density_exact"] == 2.0
 
 
-def test_errors_of_density_add_up_whichever_their_sign():
+def test_density_error_adds_absolute_values():
     right = tube()
     factor = np.where(np.arange(right.x.size) % 2, 1.1, 0.95)
     wrong = right._replace(density=factor * right.density)
@@ -56,7 +56,7 @@ def test_errors_of_density_add_up_whichever_their_sign():
     assert found == pytest.approx(expected, rel=ROUND_OFF)
 
 
-def test_gas_that_leaves_a_vacuum_has_neither_plateaus_nor_shocks():
+def test_vacuum_tube_has_no_plateaus_and_shocks():
     parting = riemann.State(1.0, -9.0, 1.0), riemann.State(1.0, 9.0, 1.0)
     x = np.linspace(0.35, 0.9, 50)  # the vacuum ends at 0.31
     states = {"peak_density_exact", "density_L1_relative"}
@@ -64,7 +64,7 @@ def test_gas_that_leaves_a_vacuum_has_neither_plateaus_nor_shocks():
     assert set(tube_figures.of(tube(time=0.0))) == states
 
 
-def test_plateaus_are_medians_of_their_inner_part():
+def test_plateau_is_median_of_inner_part():
     """A hundred particles in each outer tenth and a third of those within are far off."""
     x, off = [], []
     for start, end in ((SPEED.left_tail, SPEED.contact), (SPEED.contact, SPEED.right_tail)):
@@ -97,7 +97,7 @@ def test_plateaus_are_medians_of_their_inner_part():
 
 @pytest.mark.parametrize("too_far", [0.05, -0.05])
 @pytest.mark.parametrize("side", ["left", "right"])
-def test_the_way_of_a_shock_is_that_in_the_gas_ahead_of_it(side, too_far):
+def test_shock_distance_relative_to_gas_ahead(side, too_far):
     """The jump is a slope, between whose particles the middle is found to round-off."""
     left = side == "left"
     shock, ahead = (SPEED.left_head, LEFT) if left else (SPEED.right_head, RIGHT)
@@ -113,14 +113,14 @@ def test_the_way_of_a_shock_is_that_in_the_gas_ahead_of_it(side, too_far):
     assert tube_figures.of(bent)[f"shock_{side}_error"] == pytest.approx(too_far, rel=1e-9)
 
 
-def test_a_faint_shock_is_not_looked_for():
+def test_weak_shock_is_not_measured():
     """Of 1 % in density, as states in a few digits leave; one of 4 % is a shock."""
     for rise, there in ((1.014, False), (1.057, True)):
         push = riemann.State(1.0, 0.0, 1.0), riemann.State(1.0, 0.0, rise**2)
         assert ("shock_left_error" in tube_figures.of(tube(states=push))) == there
 
 
-def test_heat_at_the_contact_is_the_most_between_the_outer_waves():
+def test_contact_heating_is_maximum_between_outer_waves():
     exact = tube()
     heat = np.ones(exact.x.size)
     inner = np.flatnonzero((SPEED.left_tail * TIME < exact.x) & (exact.x < SPEED.right_tail * TIME))
@@ -130,7 +130,7 @@ def test_heat_at_the_contact_is_the_most_between_the_outer_waves():
     assert found["contact_energy_excess"] == pytest.approx(0.2, rel=1e-9)
 
 
-def test_a_tube_is_measured_from_its_diaphragm_within_its_error_range():
+def test_tube_figures_from_diaphragm_within_error_region():
     problem = ShockTube(n=100, discontinuity=0.1, error_range=[-0.3, 0.4])
     position, _, mass, _ = problem.initial(AIR)
     exact = problem.exact(AIR, TIME, position)

@@ -44,11 +44,11 @@ def run(simulation, until=0.2):
         simulation.advance(until)
 
 
-def test_a_sound_run_is_left_alone(begin):
+def test_valid_run_passes(begin):
     run(begin())
 
 
-def test_a_step_cut_to_land_on_an_output_does_not_shorten_the_next(begin):
+def test_step_cut_for_output_does_not_shorten_next(begin):
     simulation = begin()
     allowed = simulation.limit.dt
     simulation.advance(1e-6 * allowed)
@@ -67,7 +67,7 @@ def test_a_step_cut_to_land_on_an_output_does_not_shorten_the_next(begin):
         ("energy_rate", -np.inf, "rate of energy"),
     ],
 )
-def test_numbers_that_mean_nothing(begin, name, value, words):
+def test_unphysical_value_names_particle(begin, name, value, words):
     simulation = begin("physics.energy_limit=false")
     getattr(simulation.particles, name)[..., 7] = value
     with pytest.raises(NumericalError, match=f"{words} of particle") as caught:
@@ -75,7 +75,7 @@ def test_numbers_that_mean_nothing(begin, name, value, words):
     assert caught.value.particle == simulation.particles.id[7]
 
 
-def test_without_that_guard_they_go_unseen(begin, monkeypatch):
+def test_nan_without_guard_is_not_detected(begin, monkeypatch):
     for guard in ("_check_numbers", "_check_energy"):  # a drift that is not a number is one, too
         monkeypatch.setattr(watchdog.Watchdog, guard, lambda *_: None)
     simulation = begin()
@@ -85,7 +85,7 @@ def test_without_that_guard_they_go_unseen(begin, monkeypatch):
     assert np.isnan(simulation.totals.energy)
 
 
-def test_energy_that_comes_from_nowhere(begin, monkeypatch):
+def test_energy_from_nowhere_stops_run(begin, monkeypatch):
     """Cold streams meet under a large alpha: energy is gained, though every number is finite."""
     unstable = (
         "problem.left={density=1.0,velocity=1.0,pressure=1e-6}",
@@ -107,7 +107,7 @@ def test_energy_that_comes_from_nowhere(begin, monkeypatch):
     "stiff",
     ["physics.alpha=5.0", "physics.alpha=8.0", "physics.alpha=16.0", "physics.C=2.0"],
 )
-def test_large_alpha_and_large_courant_numbers_are_held(begin, monkeypatch, stiff):
+def test_large_alpha_and_courant_number_stay_stable(begin, monkeypatch, stiff):
     def drift():
         simulation = begin("physics.alpha=1.0", stiff, "physics.max_energy_drift=1e9")
         before = simulation.totals.energy
@@ -145,7 +145,7 @@ def test_large_alpha_and_large_courant_numbers_are_held(begin, monkeypatch, stif
         ((), "a larger physics.max_energy_drift", "physics.energy_limit"),
     ],
 )
-def test_what_to_try_can_help(begin, settings, words, not_words):
+def test_suggestion_helps(begin, settings, words, not_words):
     simulation = begin("physics.alpha=1.0", *settings)
     remedy = faults.drift_remedy(simulation)
     assert words in remedy
@@ -163,15 +163,13 @@ def test_what_to_try_can_help(begin, settings, words, not_words):
         ("viscosity", ("physics.alpha=16.0",), "a smaller value of physics.alpha"),
     ],
 )
-def test_what_to_try_where_steps_are_too_short_is_not_shorter_ones(
-    begin, criterion, settings, words
-):
+def test_suggestion_for_tiny_steps_is_not_smaller_courant_number(begin, criterion, settings, words):
     simulation = begin(*settings)
     simulation.limit = step_size.StepLimit(1e-30, 1, criterion)
     assert words in faults.longer_steps(simulation)
 
 
-def test_every_criterion_has_words():
+def test_every_criterion_has_description():
     text = TUBE.format(boundary="mirror")
     settings = [
         'physics.heating={name="relaxation",energy=20.0,time=0.01}',
@@ -193,7 +191,7 @@ def test_every_criterion_has_words():
 
 
 @pytest.mark.parametrize(("drift", "is_wrong"), [(0.03, True), (-0.03, True), (0.01, False)])
-def test_energy_drift_beyond_its_bound_stops_the_run(begin, drift, is_wrong):
+def test_energy_drift_beyond_bound_stops_run(begin, drift, is_wrong):
     simulation = begin("physics.max_energy_drift=0.02")
     simulation.energy_drift = drift
     if not is_wrong:
@@ -211,7 +209,7 @@ def test_energy_drift_beyond_its_bound_stops_the_run(begin, drift, is_wrong):
     ("step", "ratio", "is_wrong"),
     [(100, 0.7, True), (100, 1.4, True), (100, 0.8, False), (99, 0.3, False)],
 )
-def test_densities_that_do_not_fill_the_box_stop_the_run(begin, step, ratio, is_wrong):
+def test_wrong_total_volume_stops_run(begin, step, ratio, is_wrong):
     simulation = begin()
     simulation.step = step
     volume = ratio * simulation.scene.domain.volume
@@ -224,7 +222,7 @@ def test_densities_that_do_not_fill_the_box_stop_the_run(begin, step, ratio, is_
     assert "a larger physics.eta" in str(caught.value)
 
 
-def test_too_few_neighbours_in_a_closed_box_stop_the_run(begin):
+def test_too_few_neighbours_in_closed_box_stop_run(begin):
     """In 3-D at eta = 0.8 the density of disturbed gas is 40 % too high, and stays so."""
     text = """
 [problem]
@@ -244,7 +242,7 @@ interval = 10.0
         run(begin(text=text), 10.0)
 
 
-def test_energy_that_heating_adds_is_no_drift(begin):
+def test_energy_added_by_heating_is_not_drift(begin):
     warm = begin('physics.heating={name="relaxation",energy=20.0,time=0.01}')
     before = warm.totals.energy
     run(warm, 0.05)
@@ -266,7 +264,7 @@ interval = 0.1
 
 
 @pytest.mark.parametrize(("inside", "outside"), [(-200.0, -202.0), (200.0, 202.0)])
-def test_a_particle_lost_from_an_open_domain(begin, monkeypatch, inside, outside):
+def test_particle_lost_from_open_domain_stops_run(begin, monkeypatch, inside, outside):
     """It is 2 wide along y, and ends 100 widths beyond; a periodic axis has no end."""
     simulation = begin(text=SHEET)
     p = simulation.particles
@@ -280,7 +278,7 @@ def test_a_particle_lost_from_an_open_domain(begin, monkeypatch, inside, outside
     simulation.watchdog.check(simulation)
 
 
-def test_a_step_that_collapses(begin, monkeypatch):
+def test_collapsing_step_stops_run(begin, monkeypatch):
     """Steps shrink for good to a billionth of what the run took before."""
     monkeypatch.setattr(watchdog, "WINDOW", 20)
     simulation = begin()
@@ -315,7 +313,7 @@ def after_windows(simulation, *lengths):
         dog._check_pace(state)
 
 
-def test_a_pace_is_compared_with_the_best_there_was(begin):
+def test_pace_compared_with_best_so_far(begin):
     simulation = begin()
     after_windows(simulation, 1e-9, 2e-9, 1e-9)  # slow from the start
     after_windows(simulation, 1.0, 1e-3, 2e-6)
@@ -323,7 +321,7 @@ def test_a_pace_is_compared_with_the_best_there_was(begin):
         after_windows(simulation, 1.0, 1e-4, 1e-8)
 
 
-def test_a_step_too_small_to_move_time(begin, monkeypatch):
+def test_step_too_small_to_advance_time_stops_run(begin, monkeypatch):
     simulation = begin()
     simulation.advance(math.inf)
     allowed = step_size.limit
@@ -348,7 +346,7 @@ PARTING = (
 )
 
 
-def test_without_its_rule_internal_energy_becomes_negative(begin, monkeypatch):
+def test_internal_energy_without_positive_update_becomes_negative(begin, monkeypatch):
     monkeypatch.setattr(step_size, "SUPPORT_CHANGE", math.inf)
     simulation = begin(*PARTING, boundary="open")
     run(simulation, 0.03)
@@ -361,7 +359,7 @@ def test_without_its_rule_internal_energy_becomes_negative(begin, monkeypatch):
         run(begin(*PARTING, boundary="open"), 0.03)
 
 
-def test_a_step_bound_by_supports_leaves_energies_to_themselves(begin, monkeypatch):
+def test_step_limited_by_support_change_injects_no_energy(begin, monkeypatch):
     bounded = begin(*PARTING, boundary="open")
     run(bounded, 0.03)
     assert bounded.energy_injected == 0
@@ -390,7 +388,7 @@ interval = 0.02
 """
 
 
-def test_a_step_after_a_stiff_one_grows_by_its_factor(begin, monkeypatch):
+def test_step_after_stiff_one_growth_is_limited(begin, monkeypatch):
     """Without viscosity particles pass each other, and all at once none approaches another."""
 
     def largest_growth():
@@ -407,7 +405,7 @@ def test_a_step_after_a_stiff_one_grows_by_its_factor(begin, monkeypatch):
     assert largest_growth() > 10
 
 
-def test_the_watchdog_costs_next_to_nothing_where_all_is_well(begin):
+def test_check_of_valid_state_reads_no_particles(begin):
     """It looks at no particle: with the arrays taken away it still says that all is well."""
     simulation = begin()
     particles = simulation.particles
@@ -419,7 +417,7 @@ def test_the_watchdog_costs_next_to_nothing_where_all_is_well(begin):
 LIQUID = "physics.eos={ name = 'stiffened_gas', gamma = 4.4, p_inf = 1.0 }"
 
 
-def test_a_liquid_torn_apart_is_named_and_not_an_ideal_gas(begin):
+def test_liquid_under_tension_stops_run_naming_particle(begin):
     # at a free end the density sum finds half of the neighbours: a tension of 0.4 x 4.4 p_inf
     with pytest.raises(NumericalError, match="particle 61 is under more tension") as error:
         begin(LIQUID, boundary="open")
@@ -428,7 +426,7 @@ def test_a_liquid_torn_apart_is_named_and_not_an_ideal_gas(begin):
     run(begin(boundary="open"), until=0.02)
 
 
-def test_without_that_guard_the_liquid_is_a_number_that_is_none(begin, monkeypatch):
+def test_liquid_under_tension_without_guard_becomes_nan(begin, monkeypatch):
     monkeypatch.setattr(Gas, "check", Part.check)
     with pytest.raises(NumericalError, match="acceleration"):
         begin(LIQUID, boundary="open")
@@ -459,7 +457,7 @@ end = 0.1
         ("time.end=1e-320", r"time\.end is 9\.99989e-321"),
     ],
 )
-def test_what_no_sum_can_hold_is_named_before_the_first(begin, override, words):
+def test_values_beyond_range_refused_before_first_evaluation(begin, override, words):
     with pytest.raises(NumericalError, match=words + r"[\s\S]*Try: other code units"):
         begin(override, text=CLOUD)
 
@@ -473,13 +471,13 @@ def test_what_no_sum_can_hold_is_named_before_the_first(begin, override, words):
     ],
 )
 @pytest.mark.filterwarnings("error")
-def test_numbers_too_extreme_to_place_particles_are_refused(problem, settings):
+def test_box_too_extreme_for_placement_is_refused(problem, settings):
     config = configuration.from_text(f'[problem]\nname = "{problem}"\nn = 100\n{settings}\n')
     with pytest.raises(ConfigError, match=f"{problem}: particles cannot be placed[\\s\\S]*Try: "):
         Scene(config).initial_state()
 
 
-def test_a_particle_on_an_unsoftened_mass_is_named(begin):
+def test_particle_on_unsoftened_point_mass_is_named(begin):
     field = 'physics.external={name="point_mass",mass=1.0}'
     with pytest.raises(NumericalError, match=r"potential energy .* particle 2 [\s\S]*softening"):
         begin(field, text=CLOUD)
@@ -487,7 +485,7 @@ def test_a_particle_on_an_unsoftened_mass_is_named(begin):
 
 
 @pytest.mark.parametrize("pulled", [False, True])
-def test_a_drift_under_an_external_field_may_be_cured_by_softening_it(begin, pulled):
+def test_energy_drift_in_external_field_suggests_softening(begin, pulled):
     field = ['physics.external={name="point_mass",mass=1.0,softening=0.1}'] * pulled
     simulation = begin(*field, text=CLOUD)
     simulation.particles.internal_energy *= 2.0
@@ -499,7 +497,7 @@ def test_a_drift_under_an_external_field_may_be_cured_by_softening_it(begin, pul
 @pytest.mark.parametrize(
     ("key", "words"), [("velocity", "kinetic"), ("internal_energy", "internal")]
 )
-def test_a_sum_beyond_numbers_is_told_from_a_step_too_small(begin, key, words):
+def test_overflowing_sum_distinguished_from_tiny_step(begin, key, words):
     simulation = begin()
     getattr(simulation.particles, key)[..., 7] = 1e200 if key == "velocity" else 1.7e308
     simulation.particles.mass[7] = 1e3
@@ -510,7 +508,7 @@ def test_a_sum_beyond_numbers_is_told_from_a_step_too_small(begin, key, words):
         simulation._measure(past=None)
 
 
-def test_a_run_that_will_not_come_to_its_end(begin, monkeypatch):
+def test_run_far_too_slow_to_finish_stops(begin, monkeypatch):
     monkeypatch.setattr(watchdog, "WINDOW", 20)
     with pytest.raises(NumericalError, match="cannot reach"):
         run(begin("physics.C=1e-17"))
@@ -521,7 +519,7 @@ def test_a_run_that_will_not_come_to_its_end(begin, monkeypatch):
     assert 0.0 < simulation.time < 50 * 1e-17  # on its way to .2
 
 
-def test_without_a_look_at_the_range_words_are_of_what_is_not_wrong(begin, monkeypatch):
+def test_extreme_values_without_range_check_give_misleading_error(begin, monkeypatch):
     monkeypatch.setattr(watchdog.Watchdog, "check_range", lambda *_: None)
     with pytest.raises(NumericalError, match="no support radius contains enough neighbours"):
         begin("problem.velocities=[[0.0],[1e155],[0.0],[0.0]]", text=CLOUD)

@@ -47,7 +47,7 @@ def refusal(state, check="check"):
 
 
 @pytest.mark.parametrize("check", ["check", "check_range"])
-def test_gas_at_rest_is_left_alone(check):
+def test_gas_at_rest_passes(check):
     assert refusal(quiet(), check) is None
 
 
@@ -60,7 +60,7 @@ def test_gas_at_rest_is_left_alone(check):
         ("internal_energy", (0.0, 0.9e100), (-1e-300, 1.1e100, np.nan)),
     ],
 )
-def test_what_a_run_begins_with_has_cubes_and_inverses_that_are_numbers(name, within, beyond):
+def test_initial_values_cubes_and_inverses_must_be_finite(name, within, beyond):
     for value in (*within, *beyond):
         state = quiet()
         getattr(state.particles, name)[..., 2] = value
@@ -75,7 +75,7 @@ def test_what_a_run_begins_with_has_cubes_and_inverses_that_are_numbers(name, wi
 @pytest.mark.parametrize(
     ("size", "is_wrong"), [(0.9e-100, True), (1.1e-100, False), (0.9e100, False), (1.1e100, True)]
 )
-def test_boxes_and_ends_that_are_refused_by_their_size(size, is_wrong):
+def test_box_and_end_time_of_extreme_size_are_refused(size, is_wrong):
     tall, late = quiet(), quiet()
     tall.scene.domain.box = np.array([[0.0, 1.0], [0.0, size]])
     late.scene.config.time.end = size
@@ -87,14 +87,14 @@ def test_boxes_and_ends_that_are_refused_by_their_size(size, is_wrong):
 
 @pytest.mark.parametrize("name", ["energy", "max_density", "rates"])
 @pytest.mark.parametrize("value", [np.nan, np.inf])
-def test_a_sum_that_is_not_finite_is_seen_though_every_particle_is(name, value):
+def test_non_finite_sum_of_finite_particles_is_detected(name, value):
     state = quiet()
     setattr(state.totals, name, value)
     assert "is not finite" in str(refusal(state))
 
 
 @pytest.mark.parametrize("dt", [np.nan, np.inf, 0.0, -1.0])
-def test_a_step_that_does_not_move_time_is_seen(dt):
+def test_step_that_does_not_advance_time_is_detected(dt):
     state = quiet()
     state.limit = state.limit._replace(dt=dt)
     assert refusal(state) is not None
@@ -107,7 +107,7 @@ def test_a_step_that_does_not_move_time_is_seen(dt):
         ("density", 0.0, True), ("density", 1e-300, False),
     ],
 )  # fmt: skip
-def test_energies_may_fall_to_nothing_and_densities_may_not(name, value, is_wrong):
+def test_zero_energy_accepted_and_zero_density_refused(name, value, is_wrong):
     state = quiet()
     getattr(state.particles, name)[2] = value
     setattr(state.totals, f"min_{name}", value)
@@ -116,7 +116,7 @@ def test_energies_may_fall_to_nothing_and_densities_may_not(name, value, is_wron
     assert error is None or error.particle == 13
 
 
-def test_what_a_run_begins_with_is_not_cured_by_smaller_steps():
+def test_suggestion_at_start_is_not_smaller_step():
     state = quiet()
     state.particles.density[2] = state.totals.min_density = 0.0
     assert "physics.C" in str(refusal(state))
@@ -125,7 +125,7 @@ def test_what_a_run_begins_with_is_not_cured_by_smaller_steps():
 
 
 @pytest.mark.parametrize(("above", "is_torn"), [(1e-9, False), (0.0, True), (-1e-9, True)])
-def test_gas_is_torn_where_sound_has_no_speed(above, is_torn):
+def test_zero_sound_speed_under_tension_is_detected(above, is_torn):
     liquid = '[problem]\nname = "uniform"\n[physics]\n'
     liquid += 'eos = { name = "stiffened_gas", gamma = 4.4, p_inf = 1.0 }\n'
     gas = Scene(configuration.from_text(liquid)).formulation
@@ -150,7 +150,7 @@ def test_gas_is_torn_where_sound_has_no_speed(above, is_torn):
           "internal_energy": np.array([3.5, 1.0, 1.0, 1.0])}, 14),
     ],
 )  # fmt: skip
-def test_a_drift_names_the_particle_with_the_most_energy(changed, particle):
+def test_energy_drift_names_most_energetic_particle(changed, particle):
     state = quiet(**changed)
     state.energy_drift = np.nan
     assert refusal(state).particle == particle
@@ -161,7 +161,7 @@ def test_a_drift_names_the_particle_with_the_most_energy(changed, particle):
 @pytest.mark.parametrize(
     ("y", "is_lost"), [(-199.0, False), (-201.0, True), (201.0, False), (203.0, True)]
 )
-def test_a_lost_particle_is_a_hundred_lengths_away_on_either_side(y, is_lost):
+def test_particle_lost_beyond_hundred_box_lengths(y, is_lost):
     state = quiet()
     state.particles.position[:, 2] = 1e9, y  # along x there is a wall
     state.particles.position[1, 0] = 200.0 if y < 0.0 else -199.0  # the farthest on the other side
@@ -183,7 +183,7 @@ def test_a_lost_particle_is_a_hundred_lengths_away_on_either_side(y, is_lost):
         ((0.1, 0.16e-12), "collapsed"),
     ],
 )
-def test_a_pace_that_leads_nowhere_is_told(covered, words):
+def test_pace_that_never_finishes_is_reported(covered, words):
     def run():
         state = quiet()
         dog = watchdog.Watchdog(state.scene)
@@ -199,7 +199,7 @@ def test_a_pace_that_leads_nowhere_is_told(covered, words):
         run()
 
 
-def test_what_is_left_is_counted_from_now():
+def test_remaining_steps_counted_from_now():
     """A pace of 0.2e-12 a window is too slow for 0.25 and not for the 0.15 that are left."""
     dog, state = watchdog.Watchdog(quiet().scene), quiet()
     state.time = 0.1
@@ -215,7 +215,7 @@ def test_what_is_left_is_counted_from_now():
 
 
 @pytest.mark.parametrize(("step", "is_looked_at"), [(1999, False), (2000, True)])
-def test_a_window_begins_where_the_last_one_ended(step, is_looked_at):
+def test_pace_window_starts_after_last(step, is_looked_at):
     """A restart at step 1000: the first look is after a whole window."""
     dog, state = watchdog.Watchdog(quiet().scene), quiet()
     state.step = 1000

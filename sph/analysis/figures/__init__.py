@@ -1,4 +1,4 @@
-"""Pictures of runs and checkpoints: `draw` decides which, the modules beside it draw one each."""
+"""Pictures of runs and checkpoints: `draw` selects them; each module draws one kind."""
 
 from collections.abc import Sequence
 from pathlib import Path

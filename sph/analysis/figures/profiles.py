@@ -1,4 +1,4 @@
-"""Profiles of density, velocity, pressure and internal energy, along x or against the radius."""
+"""Profiles of density, velocity, pressure and internal energy, along x or the radius."""
 
 import textwrap
 from collections.abc import Sequence

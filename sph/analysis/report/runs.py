@@ -3,15 +3,15 @@
 import math
 import os
 import re
-import tomllib
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 from sph import warnings
+from sph.config import reading
 from sph.config.toml_text import value_text
-from sph.errors import FileError
+from sph.errors import ConfigError, FileError
 from sph.output.files import read_text
 from sph.output.run_directory import RunDirectory
 from sph.summary import Errors, Summary, lookup, wall_without_start
@@ -167,20 +167,28 @@ def natural(name: str) -> list:
 def _row(path: Path) -> Row:
     path = path.resolve()
     run = RunDirectory(path)
-    try:
-        tables = tomllib.loads(read_text(run.config))
-        settings = {
-            f"{table}.{key}": value
-            for table, keys in tables.items()
-            if table != "run"
-            for key, value in keys.items()
-        }
-    except (OSError, ValueError, AttributeError, RecursionError) as error:
-        raise FileError(f"{run.config} cannot be read: {error}") from None
+    settings = _settings(run.config)
     if not run.summary.exists():
         return Row(path, path.name, settings, None, "unfinished", "it has not ended")
     summary = run.whole_summary()
     return Row(path, path.name, settings, summary, summary["status"], summary["reason"] or "")
+
+
+def _settings(path: Path) -> dict[str, Any]:
+    """Every key of a run's config.toml but those of [run], as table.key. Raises FileError."""
+    try:
+        tables = reading.parse(read_text(path), str(path)).tables
+    except ConfigError as error:
+        raise FileError(str(error)) from None
+    for table, keys in tables.items():
+        if not isinstance(keys, dict):
+            raise FileError(f"{path}: {table} = {value_text(keys)}: expected a table [{table}]")
+    return {
+        f"{table}.{key}": value
+        for table, keys in tables.items()
+        if table != "run"
+        for key, value in keys.items()
+    }
 
 
 def _never_begun(sweep: SweepDirectory) -> dict[Path, Row]:

@@ -29,7 +29,7 @@ def _costs(report: Report) -> str:
     truths = {row.truth for row in report.rows}
     named = truths.pop() if len(truths) == 1 and "." not in question.field else None
     against = f" against the run {Path(named).name}" if named is not None else ""
-    text = f"Compared: {question.error_name}{against}, weighed with {COSTS[question.cost][0]}"
+    text = f"Compared: {question.error_name}{against}, plotted against {COSTS[question.cost][0]}"
     if question.cost in ("cpu", "wall"):
         text += " without compilation and the start of Numba"
     return text + "."
@@ -95,7 +95,7 @@ def _warnings(report: Report) -> list[str]:
 def _name(line: Series) -> str:
     """The label of a line, with its sweep unless the label says it."""
     sweep = "" if line.label.startswith(f"{line.sweep} = ") else line.sweep
-    return ": ".join(filter(None, [sweep, line.label])) or "These runs"
+    return ": ".join(filter(None, [sweep, line.label])) or "the series"
 
 
 def _resolutions(report: Report, members: list[int]) -> str:

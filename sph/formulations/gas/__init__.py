@@ -1,4 +1,4 @@
-"""Grad-h SPH of a gas: density from neighbours, pair forces, artificial viscosity."""
+"""Compressible gas by grad-h SPH: density, pair forces and internal energy."""
 
 from typing import Literal, NamedTuple
 
@@ -24,7 +24,7 @@ FIELDS = (*COMMON, Field("omega"))
 
 
 class Models(NamedTuple):
-    """The models in the formulas. Their types, not their values, determine the compiled code."""
+    """The models in the formulas. Their types, not their parameters, decide the compiled code."""
 
     scheme: tuple
     kernel: tuple
@@ -36,7 +36,7 @@ class Models(NamedTuple):
     balsara: tuple | None
     support_ratio: float  # H/h of the kernel
     eta: float
-    max_support: float  # upper limit of H, for particles without a root below; inf: none
+    max_support: float  # upper limit of H; inf for no limit
 
 
 class Gas(Formulation):
@@ -52,20 +52,20 @@ class Gas(Formulation):
         ),
         Key(
             "density",
-            'density estimate of a particle: "mass" sums m_j W over its neighbours; "number" sums '
-            "W and multiplies by its own mass, which is better for unequal masses and identical "
-            "for equal ones",
+            'density estimate of a particle: "mass" sums m_j W over the neighbours; "number" sums '
+            "W over the neighbours and multiplies by the particle's own mass, which is better for "
+            "unequal masses and identical for equal masses",
             kind=Literal["mass", "number"],
             default="mass",
         ),
         Key(
             "density_passes",
-            "iterations of density and smoothing length in each step, which depend on each other: "
-            'a number, or "converged" to iterate until they no longer change',
+            "number of iterations per step for density and smoothing length, which depend on each "
+            'other; "converged" iterates until both are constant to 1e-10',
             kind=int | Literal["converged"],
             default=2,
             at_least=1,
-            at_most=100,  # more converge no further, and a step would never end
+            at_most=100,  # more iterations change nothing but the time that a step takes
         ),
     )
     roles = ("viscosity", "balsara", "exchange")
@@ -161,10 +161,13 @@ class Gas(Formulation):
         )  # fmt: skip
 
     def _density(self, sweep) -> None:
-        """Do steps 2-4 and 6: density, support, Omega, div v, curl v, and what follows."""
+        """Do steps 2-4 and 6: density, support, Omega, div v, curl v, EOS and rate of alpha."""
         s = sweep.state
+        # Before the first step supports are guesses and must converge. Only this pass gets the
+        # models for that, so no other pass is compiled twice.
+        models = self.starting_models if sweep.is_start else sweep.models
         sweep.run(
-            density, sweep.models, s.position, s.predicted_velocity, s.mass, s.predicted_energy,
+            density, models, s.position, s.predicted_velocity, s.mass, s.predicted_energy,
             s.support, s.get("predicted_alpha"), s.support_before, s.density, s.omega,
             s.get("pressure"), s.get("energy_shift"), s.get("div_v"), s.get("curl_v"),
             s.pressure_term, s.sound_speed, s.get("balsara"), s.get("alpha_rate"), sweep.wanted,
@@ -209,13 +212,13 @@ class Gas(Formulation):
             if self.density_passes == "converged"
             else f"{self.density_passes} density pass(es)",
         ]
-        sums = "sum of the pressure"
+        sums = "pressure sum over neighbours"
         if self.scheme.sums_pressure:
             return [*inside, sums], []
-        return inside, [(sums, f"{self.scheme.name} takes it from density")]
+        return inside, [(sums, f"{self.scheme.name} computes pressure from density")]
 
     def check(self, simulation):
-        """Raise NumericalError if the sound speed of a particle is not real, under tension."""
+        """Raise NumericalError if tension makes the sound speed of a particle imaginary."""
         if self.eos.lowest_energy is None:
             return
         p = simulation.particles

@@ -1,4 +1,4 @@
-"""The density pass: eqs 7-8, 15-17, and the sum of a scheme that sums its pressure."""
+"""The density pass: eqs 7-8 and 15-17, and the pressure sum of schemes that need one."""
 
 import numpy as np
 from numba import njit
@@ -18,11 +18,11 @@ def density(
     support_before, alpha, support, rho, Omega, pressure, energy_shift, div_v, curl_v,
     pressure_term, sound_speed, balsara, alpha_rate, wanted,
 ):  # fmt: skip
-    """Density pass over blocks [first_block, last_block), and what follows from it.
+    """Density pass over blocks [first_block, last_block), with the quantities that follow from it.
 
     wanted (blocks,): see `sph.passes.Sweep`. A particle whose support was not found gets a density
-    of -1. None leave out: pressure (nothing needs it), energy_shift (no scheme that sums it),
-    div_v, curl_v, balsara, alpha and alpha_rate.
+    of -1. An array is None if the scene does not need it: pressure, energy_shift (of schemes that
+    sum the pressure), div_v, curl_v, balsara, alpha and alpha_rate.
     """
     D = len(dim)
     kernel, weighting = models.kernel, models.weighting
@@ -85,7 +85,7 @@ def density(
             if div_v is not None:
                 H_inv = 1.0 / H
                 scale = -C * H_inv ** (D + 2) / (Omega_i * rho_i)
-                scale *= mass_per_weight(weighting, mass[i])  # over n_i, that is
+                scale *= mass_per_weight(weighting, mass[i])  # 1/n_i instead of 1/rho_i
                 total = curl_x = curl_y = curl_z = 0.0
                 for k in range(nc):
                     m_dw = m[k] * dw_over_q(kernel, dim, r[k] * H_inv)

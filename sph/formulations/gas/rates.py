@@ -1,4 +1,4 @@
-"""The rate pass: eqs 22-26, with the pair force of the scheme."""
+"""The rate pass: acceleration and du/dt (eqs 22-26), with the pair force of the scheme."""
 
 import numpy as np
 from numba import njit
@@ -22,9 +22,9 @@ def rates(
     """Rate pass over blocks [first_block, last_block): eqs 22-26.
 
     Writes acceleration (D, N), energy_rate (N,) and signal_speed (N,), the largest v_sig of each
-    particle over its pairs and itself (eq 32). None leave out: alpha (one constant), balsara,
-    pressure (nothing needs it), energy_shift (no scheme that sums it), exchanged (the energy, where
-    a term exchanges it), shares (the exchange acts everywhere).
+    particle over its pairs and itself (eq 32). An array is None if the scene does not need it:
+    alpha (if constant), balsara, pressure, energy_shift (of schemes that sum the pressure),
+    exchanged (the internal energy, for conductivity), shares (for switched conductivity).
     """
     D = len(dim)
     kernel, weighting, viscosity = models.kernel, models.weighting, models.viscosity

@@ -1,10 +1,11 @@
 """Support radius H and density of a particle from its neighbours (step 2).
 
-Both methods use distances r[:nc] and weights m[:nc] (by default masses, see `weighting`) of the
-candidates of a particle. They return (H, rho or the sum that replaces it, Omega, wanted). `wanted`
-is 0.0 or, if H exceeds `reach`, up to which the candidates are complete, the radius that the lists
-must reach before the next attempt. If there is no root up to `largest`, H is `largest` and Omega is
-1, since H does not depend on the density.
+Both methods use the distances r[:nc] and weights m[:nc] (by default masses, see `weighting`) of the
+candidates of a particle. They return (H, sum of weights, Omega, wanted); with masses as weights the
+sum is the density rho. The candidates are complete up to the radius `reach`. If H exceeds `reach`,
+`wanted` is the radius that the lists must reach before the next attempt; otherwise it is 0.0. If
+there is no root up to `largest`, H is `largest` and Omega is 1, because H does not depend on the
+density.
 """
 
 from typing import NamedTuple
@@ -15,9 +16,9 @@ from sph.compiled import INLINED, verb
 from sph.kernels import dw_over_q, normalisation, w
 
 # Each pass of eqs 7 and 15 multiplies the distance from their common root by 1 - Omega. In resolved
-# flow this converges to within one per cent. It diverges if Omega exceeds 2, at jumps of mass or
-# density between neighbours. If the last pass changes H by more than this fraction, the root is
-# solved for instead.
+# flow the passes converge to within one per cent. They diverge if Omega exceeds 2, at jumps of mass
+# or density between neighbours. If the last pass changes H by more than this fraction, Newton's
+# iteration finds the root instead.
 UNSETTLED = 0.05
 
 # The logarithm of the sum of masses is nearly linear in that of H: Newton's iteration needs 3 or 4
@@ -31,7 +32,7 @@ def find_support(self, kernel, dim, r, m, nc, mass, H, ratio, reach, largest):
 
 
 class FixedPasses(NamedTuple):
-    """Evaluate eqs 7, 8 and 15 `count` times, or solve them if that does not converge."""
+    """Evaluate eqs 7, 8 and 15 `count` times; solve them if the last change of H is large."""
 
     count: int
     tolerance: float  # of the solution, relative
@@ -99,8 +100,9 @@ def solve(kernel, dim, r, m, nc, mass, H, ratio, reach, largest, tolerance):
                 return H, C * H_inv**D * sum_w, 1.0, 0.0
         else:
             upper = H
-        # d ln(sum m w)/d ln H = -sum_dw/sum_w; it vanishes without neighbours, where the step
-        # goes to its bound, upwards a small one: a support too wide has many neighbours
+        # slope = d ln(sum m w)/d ln H = -sum_dw/sum_w. Without neighbours the slope is zero, and H
+        # changes by the bound of a step. The upper bound is small otherwise, because a support that
+        # is too wide contains many neighbours.
         slope = max(-sum_dw / sum_w, 0.1)
         growth = 1.25 if slope > 0.1 else 2.0
         H_next = min(H * min(max((target / sum_w) ** (1.0 / slope), 0.5), growth), largest)

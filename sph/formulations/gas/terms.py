@@ -1,9 +1,11 @@
 """Interfaces of the terms that parts add to the pair loops and thermodynamics of the gas.
 
-viscosity   pair_alpha(alpha_i, alpha_j), and where alpha has a rate alpha_rate(…)
+Each term is a model with these methods; `balsara` and `exchange` may be None.
+
+viscosity   pair_alpha(alpha_i, alpha_j); for switches without a pass of their own also alpha_rate
 balsara     balsara_factor(divergence, curl, sound_speed, support)
-exchange    exchange_speed(pressure_i, pressure_j, density_i, density_j, w_ij): a pair then
-            exchanges m_j speed (u_i - u_j)/rho_ij (dW/dr) of energy, or None
+exchange    exchange_speed(pressure_i, pressure_j, density_i, density_j, w_ij), the speed in the
+            rate m_j speed (u_i - u_j)/rho_ij (dW/dr) at which a pair exchanges internal energy
 """
 
 from sph.compiled import verb

@@ -14,8 +14,8 @@ from sph.formulations.gas.terms import alpha_rate as alpha_rate_of
 from sph.formulations.gas.terms import balsara_factor
 
 
-# fastmath is inherited by what a function calls unless it is set there: here the order of products
-# is that of the formula, in whatever company it is compiled.
+# A function that is called from compiled code takes over `fastmath` unless it sets its own. Here
+# fastmath is off, so that the order of the products never depends on the calling function.
 @njit(nogil=True, error_model="numpy", fastmath=False, forceinline=True)
 def _over(P, Omega, rho):
     return P / (Omega * rho * rho)
@@ -23,7 +23,10 @@ def _over(P, Omega, rho):
 
 @njit(**INLINED)
 def equation_of_state(i, models, rho, Omega, energy, pressure, pressure_term, sound_speed):
-    """Pressure, P/(Omega rho^2) and sound speed; returns the last. pressure may be None."""
+    """Set pressure, P/(Omega rho^2) and sound speed, and return the sound speed.
+
+    pressure may be None.
+    """
     P = pressure_of(models.eos, rho, energy[i])
     c = sound_speed_of(models.eos, rho, P)
     pressure_term[i] = _over(P, Omega, rho)
@@ -35,7 +38,10 @@ def equation_of_state(i, models, rho, Omega, energy, pressure, pressure_term, so
 
 @njit(**INLINED)
 def summed(i, models, energy, energy_density, slope, pressure, pressure_term, energy_shift):
-    """The same of a scheme that sums its pressure: from the sum of m_j u_j W_ij and its slope."""
+    """Set the pressure terms of a scheme that sums its pressure.
+
+    energy_density: the sum of m_j u_j W_ij; slope: see `sph.formulations.gas.schemes`.
+    """
     pressure[i], pressure_term[i], energy_shift[i] = summed_terms(
         models.scheme, models.eos, energy[i], energy_density, slope
     )
@@ -43,7 +49,7 @@ def summed(i, models, energy, energy_density, slope, pressure, pressure_term, en
 
 @njit(**INLINED)
 def dissipation(i, models, H, c, div, curl, alpha, balsara, alpha_rate):
-    """Balsara's factor (eq 21) and the rate of alpha (eqs 27-28), where the scene has them."""
+    """Set Balsara's factor (eq 21) and the rate of alpha (eqs 27-28), if the scene has them."""
     if balsara is not None:
         balsara[i] = balsara_factor(models.balsara, div, curl, c, H)
     if alpha is not None:

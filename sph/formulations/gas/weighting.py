@@ -5,9 +5,10 @@ Each particle has a weight w_i, its mass (eqs 7 and 15) or 1, and with the sum o
     n_i = sum w_j W_ij(H_i),   rho_i = (m_i/w_i) n_i,   H_i = (H/h) eta (w_i/n_i)^(1/D)
     Omega_i = 1 + H_i/(D n_i) dn_i/dH_i,   dn_i/dt = 1/Omega_i sum w_j v_ij . grad W_ij(H_i)
 
-where the second line includes the dependence of H_i. With w = m, the density of a particle beside
-heavier ones contains their mass: at a contact with unequal masses, rho and pressure are too high by
-orders of magnitude. With w = 1 this does not happen. For equal masses both are identical.
+where the second line includes the dependence of n_i on H_i. With w = m, the density of a particle
+beside heavier particles contains their mass: at a contact with unequal masses, density and pressure
+are too high by orders of magnitude. With w = 1 they are not. For equal masses the results of both
+weights are identical.
 
 The forces follow from the Lagrangian sum m_i (v_i^2/2 - u_i) with du_i = P_i/rho_i^2 drho_i at
 constant entropy and drho_i = (m_i/w_i) dn_i (Springel & Hernquist 2002, with w in place of m):

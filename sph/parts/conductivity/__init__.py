@@ -1,14 +1,15 @@
-"""Artificial conductivity: exchange of internal energy between neighbours, which smooths contacts.
+"""Artificial conductivity: exchange of internal energy, which smooths contacts.
 
 A conductivity is a file with a NamedTuple that has the method
 
     exchange_speed(pressure_i, pressure_j, density_i, density_j, w_ij)    speed of the exchange
 
-where w_ij <= 0 is the speed of approach (eq 26). The pair then exchanges energy at the rate
-m_j exchange_speed (u_i - u_j) / rho_ij (dW/dr), equal and opposite for the two. If the field
-`switched` is true, the rate is multiplied by the mean of `share` of both particles, from the pass
-over contacts. The class attribute `suits_gravity` is true if there is no exchange in hydrostatic
-equilibrium in an external field.
+where w_ij <= 0 is the speed of approach (eq 26). Particle i gains internal energy per unit mass
+from particle j at the rate m_j exchange_speed (u_i - u_j) / rho_ij (dW/dr); the energies that the
+two particles exchange are equal and opposite. If the parameter `switched` is true, the rate is
+multiplied by the mean of `exchange_share` of both particles, which the pass over contacts computes.
+The class attribute `suits_gravity` is true if there is no exchange in hydrostatic equilibrium in an
+external field.
 """
 
 import math
@@ -45,7 +46,7 @@ class Conductivity(Part):
         Key(
             "conductivity",
             "artificial conductivity: smooths contacts by exchanging internal energy between "
-            "neighbours; `switched` limits it to contacts; none if not given",
+            "neighbours; `switched` limits the exchange to contacts; none if not given",
             models=FOLDER,
             example={"name": "pressure_jump", "strength": 1.0, "switched": True},
         ),
@@ -84,9 +85,9 @@ class Conductivity(Part):
         return [
             (
                 "conductivity",
-                "this model acts wherever pressure varies, which with "
-                f"physics.{balanced[0]} it does in equilibrium; expected a model that does not. "
-                'Try: "approach"',
+                "this model acts wherever pressure varies, but with "
+                f"physics.{balanced[0]} pressure varies even in equilibrium; expected a model that "
+                'does not act in equilibrium. Try: "approach"',
             )
         ]
 

@@ -34,8 +34,8 @@ def contacts(
 ):  # fmt: skip
     """Write the fractions (N,) of conductivity that act, for blocks [first_block, last_block).
 
-    v_sig is the largest (c_i + c_j)/2 - w_ij of the particle's support; velocity and energy are the
-    predicted ones.
+    v_sig is the largest (c_i + c_j)/2 - w_ij within the particle's support. `velocity` and `energy`
+    are the predicted values.
     """
     D = len(dim)
     kernel, support_ratio = models.kernel, models.support_ratio

@@ -1,6 +1,7 @@
 """Conductivity with the speed of approach of the pair (Wadsley, Veeravalli & Couchman 2008).
 
-It acts only in converging flow, not in equilibrium, so it may be used with external fields.
+This conductivity acts only in converging flow, not in equilibrium, so a configuration may combine
+it with an external field.
 """
 
 from typing import Annotated, NamedTuple

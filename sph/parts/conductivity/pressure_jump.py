@@ -1,7 +1,8 @@
-"""Conductivity with the speed sqrt(|P_i - P_j|/rho) of a pressure jump (Price 2008, eqs 27-28).
+"""Conductivity with the speed sqrt(|P_i - P_j|/rho) of a pressure jump (Price 2008).
 
-It acts at jumps of pressure: at a contact until its pressure is uniform, and at the start of a
-shock. It must not be used with external fields, in which pressure varies in equilibrium.
+Price's eqs 27-28. This conductivity acts at jumps of pressure: at a contact until the pressure is
+uniform there, and at the start of a shock. A configuration must not combine it with an external
+field, in which pressure varies in equilibrium.
 """
 
 from typing import Annotated, NamedTuple

@@ -1,12 +1,15 @@
-"""External gravitational fields, one file each: a NamedTuple with
+"""External gravitational field, added to the acceleration that the gas causes.
 
-    acceleration(position)    (D, N) at positions (D, N)
-    potential(position)       (N,) per unit mass, zero at infinity or where the file says
+A field is a file with a NamedTuple that has the methods
+
+    acceleration(position)    acceleration (D, N) at positions (D, N)
+    potential(position)       potential (N,) per unit mass; the file says where it is zero
     misfit(boundaries)        why the field cannot be used with these boundaries (one per axis) and
                               what to try, or None
 
-The first two are called from Python once per step; the last when a configuration is read.
-Reflecting walls suit every field, since no particle jumps in its potential.
+Python calls `acceleration` and `potential` once per step, and `misfit` when it reads a
+configuration. Every field works with reflecting walls, because no particle is moved to another
+place there; a periodic boundary moves particles, and so changes their potential energy.
 """
 
 from sph import registry
@@ -30,7 +33,7 @@ class Field(Model):
 
 
 class External(Part):
-    """An external field, its potential energy, and the limit of |a| on the time step."""
+    """An external field, its potential energy, and the limit on the time step by |a|."""
 
     title = "external field"
     keys = (

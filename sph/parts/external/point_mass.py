@@ -15,8 +15,10 @@ from sph.parts.external import Field
 class PointMass(NamedTuple):
     """`mass`: M; `softening`: the length s."""
 
-    mass: Annotated[float, Parameter("G M", at_least=0.0)]
-    softening: Annotated[float, Parameter("length below which it is weaker", at_least=0.0)] = 0.0
+    mass: Annotated[float, Parameter("mass M, with G = 1", at_least=0.0)]
+    softening: Annotated[
+        float, Parameter("distance below which gravity is weaker than M/r^2", at_least=0.0)
+    ] = 0.0
 
     def acceleration(self, position):
         squared = self._softened(position)

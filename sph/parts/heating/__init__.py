@@ -1,10 +1,13 @@
-"""Heating and cooling that is not caused by the flow, one file each: a NamedTuple with
+"""Heating and cooling that the flow does not cause, for example by radiation.
 
-    heated(internal_energy, dt)    u (N,) after heating alone for dt, exact or implicit
+A source is a file with a NamedTuple that has the method
 
-The method is exact or implicit, so stiff heating does not limit the time step. Each step applies
-it for dt/2 at its beginning and end (Strang splitting: Strang 1968, SIAM J. Numer. Anal. 5, 506).
-The history records the energy added, which does not count as energy drift. Called from Python.
+    heated(internal_energy, dt)    internal energy (N,) after heating alone for the time dt
+
+The method solves the heating exactly or implicitly, so stiff heating does not limit the time step.
+Each step applies the method for dt/2 at its beginning and for dt/2 at its end (Strang splitting:
+Strang 1968, SIAM J. Numer. Anal. 5, 506). The history records the energy added, which does not
+count as energy drift. The method is called from Python, not from compiled code.
 """
 
 from sph import registry
@@ -20,7 +23,7 @@ class Heating(Part):
     keys = (
         Key(
             "heating",
-            "heating or cooling that is not caused by the flow; none if not given",
+            "heating or cooling that the flow does not cause; none if not given",
             models=FOLDER,
             example={"name": "relaxation", "energy": 1.0, "time": 0.1},
             restart="same kind",

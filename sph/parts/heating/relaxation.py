@@ -11,8 +11,8 @@ from sph.model import Model, Parameter, model
 class Relaxation(NamedTuple):
     """`energy`: u_eq, per unit mass, to which the gas relaxes; `time`: tau, the relaxation time."""
 
-    energy: Annotated[float, Parameter("per unit mass, that the gas relaxes to", above=0.0)]
-    time: Annotated[float, Parameter("that it takes", above=0.0)]
+    energy: Annotated[float, Parameter("u_eq, energy of equilibrium per unit mass", above=0.0)]
+    time: Annotated[float, Parameter("relaxation time tau", above=0.0)]
 
     def heated(self, internal_energy, dt):
         return self.energy + (internal_energy - self.energy) * np.exp(-dt / self.time)

@@ -1,4 +1,4 @@
-"""Artificial viscosity: the coefficient alpha of a pair, and the Balsara factor.
+"""Artificial viscosity: coefficient alpha (constant or by a switch) and Balsara factor.
 
 A viscosity is a NamedTuple with the methods
 
@@ -6,8 +6,8 @@ A viscosity is a NamedTuple with the methods
     start()                         alpha of every particle at t = 0
     largest()                       upper limit of alpha
 
-and the class attribute `evolves`, False if alpha is one number (constant.py), which needs no array.
-The viscosities in switches/ also have the method
+and the class attribute `evolves`, which is False if alpha is constant (constant.py): a constant
+needs no array. The viscosities in switches/ also have the method
 
     alpha_rate(alpha, h, sound_speed, divergence)    rate of change of alpha (eqs 27-28)
 
@@ -16,8 +16,8 @@ or, with the class attribute `finds_shocks`, which requires the pass over veloci
     alpha_after(alpha, dt, support, signal_speed, divergence, divergence_rate, shear, signs)
 
 which returns alpha at the end of a step dt. signal_speed is the largest (c_i + c_j)/2 - w_ij within
-the support H, divergence_rate d(div v)/dt, shear the sum of squares of the traceless rate of
-strain, and signs the kernel-weighted mean of sgn(div v_j).
+the support H, divergence_rate is d(div v)/dt, shear is the sum of squares of the traceless rate of
+strain, and signs is the kernel-weighted mean of sgn(div v_j).
 """
 
 import math
@@ -144,7 +144,7 @@ class Viscosity(Part):
     def described(self):
         inside, outside = [], []
         for there, what, why_not in (
-            (self.coefficient.evolves, "equation for alpha", "alpha is one number"),
+            (self.coefficient.evolves, "equation for alpha", "alpha is constant"),
             (
                 self.coefficient.finds_shocks,
                 "gradients of velocity",

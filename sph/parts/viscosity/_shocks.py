@@ -68,8 +68,8 @@ def shocks(
 ):  # fmt: skip
     """Advance alpha (N,) by the step dt, in place, over blocks [first_block, last_block).
 
-    velocity is the predicted one, div_v (N,) of the density pass, acceleration (D, N) of the last
-    step.
+    `velocity` is the predicted velocity; `div_v` (N,) comes from the density pass, `acceleration`
+    (D, N) from the last step.
     """
     D = len(dim)
     kernel, weighting, viscosity = models.kernel, models.weighting, models.viscosity
@@ -85,7 +85,7 @@ def shocks(
     signed = np.empty(size)
     q = np.empty(size)
     weights = np.empty(size)
-    # the same of the neighbours of one particle, as differences
+    # differences between one particle and its neighbours
     near = np.empty(size, np.int64)
     r_ij = np.empty((D, size))
     v_ij = np.empty((D, size))
@@ -122,7 +122,7 @@ def shocks(
                 signs += signed[k] * w(kernel, dim, r * H_inv)
                 v_sig = c_half_i + c_half[k] - smaller(v_dot_r, 0.0) / r  # eq 76
                 fastest = larger(fastest, v_sig if r * H_inv < 1.0 else 0.0)
-            # a third of the candidates: worth a copy before the sums that follow
+            # Only a third of the candidates are neighbours: the sums below are faster over a copy.
             n = 0
             for k in range(nc):
                 near[n] = k

@@ -1,7 +1,8 @@
 """Balsara factor (eq 21): full viscosity in compression, none in pure shear or rotation.
 
-Without curl, as in 1-D, the factor is 1 except for the softening, by which it falls to 0 where
-|div v| is below 1e-4 c/H, as in a sound wave of amplitude 1e-6 but not in one of 1e-2.
+Without curl, as in 1-D, the factor is nearly 1 where |div v| is well above the softening 1e-4 c/H,
+and falls to 0 below. A sound wave of amplitude 1e-6 is below the softening, one of amplitude 1e-2
+is above.
 """
 
 from typing import NamedTuple

@@ -1,4 +1,4 @@
-"""Waves from the ends of a domain into uniform gas, from exact solutions of Riemann problems."""
+"""Waves from the ends of a domain into uniform gas, from exact Riemann solutions."""
 
 import math
 from typing import NamedTuple

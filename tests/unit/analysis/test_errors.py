@@ -10,14 +10,14 @@ from sph.analysis import errors
 ROUND_OFF = 1e-13  # sums of at most some hundred terms of order 1
 
 
-def test_constant_difference_has_that_norm_whatever_the_volumes():
+def test_norms_constant_difference_equal_difference():
     volume = np.random.default_rng(1).random(100) + 0.1
     found = errors.norms(np.full(100, -0.25), volume)
     for name in ("L1", "L2", "Linf"):
         assert found[name] == pytest.approx(0.25, rel=ROUND_OFF)
 
 
-def test_norms_weigh_by_volume():
+def test_norms_are_weighted_by_volume():
     # a difference of 2 in a quarter of the volume, none elsewhere
     found = errors.norms(np.array([2.0, 0.0]), np.array([1.0, 3.0]))
     assert found["L1"] == pytest.approx(0.5, rel=ROUND_OFF)
@@ -25,7 +25,7 @@ def test_norms_weigh_by_volume():
     assert found["Linf"] == 2.0
 
 
-def test_norms_of_a_vector_take_its_length():
+def test_norms_vector_use_its_length():
     difference = np.array([[3.0, 0.0], [-4.0, 0.0]])
     found = errors.norms(difference, np.array([1.0, 1.0]))
     assert found == pytest.approx({"L1": 2.5, "L2": np.sqrt(12.5), "Linf": 5.0}, rel=ROUND_OFF)
@@ -47,14 +47,14 @@ def tube():
     return made, particles, exact["pressure"].copy()
 
 
-def test_the_exact_state_has_no_error(tube):
+def test_errors_exact_state_are_zero(tube):
     made, particles, pressure = tube
     found = errors.against_exact(made, 0.1, particles, pressure)
     assert set(found["fields"]) == set(errors.FIELDS)
     assert all(norm["Linf"] == 0.0 for norm in found["fields"].values())
 
 
-def test_a_shift_of_each_field_is_its_error(tube):
+def test_errors_shifted_field_equal_shift(tube):
     made, particles, pressure = tube
     particles.velocity += np.array([[0.03], [0.04]])
     particles.internal_energy -= 0.01
@@ -65,7 +65,7 @@ def test_a_shift_of_each_field_is_its_error(tube):
     assert found["density"]["Linf"] == 0.0
 
 
-def test_only_the_error_region_counts(tube):
+def test_errors_outside_error_region_ignored(tube):
     made, particles, pressure = tube
     x = particles.position[0]
     inside = (x > -0.2) & (x < 0.3)
@@ -75,19 +75,19 @@ def test_only_the_error_region_counts(tube):
     assert found["region"] == "-0.2 < x < 0.3"
 
 
-def test_no_error_without_particles_in_the_region(tube):
+def test_errors_empty_region_are_missing(tube):
     made, particles, pressure = tube
     particles.position[0] = 0.4
     assert errors.against_exact(made, 0.1, particles, pressure) is None
 
 
-def test_no_error_without_an_exact_solution(tube):
+def test_errors_without_exact_solution_are_missing(tube):
     _, particles, pressure = tube
     made = config.from_text('[problem]\nname = "kelvin_helmholtz"\n')
     assert errors.against_exact(made, 0.1, particles, pressure) is None
 
 
-def test_relative_errors_are_over_the_exact_field_in_the_region_by_volume():
+def test_relative_errors_divided_by_exact_field_norm_in_region():
     """Of three particles, the last of which is outside: volumes 1 and 3."""
     state = {
         "density": np.array([2.5, 4.5, 90.0]),
@@ -111,7 +111,7 @@ def test_relative_errors_are_over_the_exact_field_in_the_region_by_volume():
     assert set(found) == set(state)  # internal energy is not in this exact solution
 
 
-def test_volumes_are_those_of_the_particles_and_not_the_exact_ones(tube):
+def test_errors_use_particle_volumes_not_exact_volumes(tube):
     made, particles, pressure = tube
     x = particles.position[0]
     inside = (x > -0.2) & (x < 0.3)

@@ -89,7 +89,7 @@ def itself(point, x_j):
     ("boundary", "separation"),
     [("periodic", nearest_image), ("mirror", all_reflections), ("open", itself)],
 )
-def test_equals_the_sum_written_out(dimension, boundary, separation):
+def test_interpolation_equals_explicit_sum(dimension, boundary, separation):
     particles = random_gas(dimension, n=40)
     values = np.random.default_rng(5).normal(size=40)
     domain = unit_domain(dimension, boundary)
@@ -101,7 +101,7 @@ def test_equals_the_sum_written_out(dimension, boundary, separation):
 
 @pytest.mark.parametrize("boundary", ["periodic", "mirror", "open"])
 @pytest.mark.parametrize("dimension", [2, 3])
-def test_pixels_and_points_have_the_same_fields(dimension, boundary):
+def test_interpolation_pixels_equal_points(dimension, boundary):
     particles, domain = random_gas(dimension, n=40), unit_domain(dimension, boundary)
     values = np.random.default_rng(5).normal(size=(2, 40))
     plane = Plane.through_centre(domain.box, 6)
@@ -112,7 +112,7 @@ def test_pixels_and_points_have_the_same_fields(dimension, boundary):
     np.testing.assert_allclose(found, expected, rtol=0, atol=ROUND_OFF)
 
 
-def test_each_kernel_weighs_by_itself():
+def test_interpolation_uses_given_kernel():
     particles, spline = random_gas(2, n=40), kernels.make("cubic_spline")
     values = np.random.default_rng(5).normal(size=40)
     plane = Plane(np.array([0.2, 0.3]), np.array([0.8, 0.6]), (5, 4))
@@ -123,7 +123,7 @@ def test_each_kernel_weighs_by_itself():
 
 @pytest.mark.parametrize("boundary", ["periodic", "mirror", "open"])
 @pytest.mark.parametrize("dimension", [2, 3])
-def test_a_constant_stays_constant(dimension, boundary):
+def test_interpolation_constant_field_is_exact(dimension, boundary):
     particles = random_gas(dimension)
     domain = unit_domain(dimension, boundary)
     plane = Plane.through_centre(domain.box, 32)
@@ -134,7 +134,7 @@ def test_a_constant_stays_constant(dimension, boundary):
     np.testing.assert_allclose(found[covered], 3.7, rtol=ROUND_OFF)
 
 
-def test_a_linear_field_on_a_lattice():
+def test_interpolation_linear_field_on_lattice_is_exact():
     # The mean of x_j over a kernel differs from x by the lattice's lack of symmetry about x alone.
     # With H of three spacings the sum differs from the integral by some 1e-3 of a spacing.
     spacing = 1.0 / 20
@@ -148,7 +148,7 @@ def test_a_linear_field_on_a_lattice():
     assert worst < 0.02 * np.sqrt(5.0) * spacing
 
 
-def test_a_slice_shows_its_own_height():
+def test_slice_shows_values_at_its_height():
     # as above: a field of z alone is constant on the slice but for the lattice's asymmetry
     spacing = 1.0 / 12
     particles = gas(lattice(spacing, 3), 3.0 * spacing)
@@ -159,7 +159,7 @@ def test_a_slice_shows_its_own_height():
     np.testing.assert_allclose(found, 0.44, atol=0.02 * spacing)
 
 
-def test_a_periodic_map_moves_with_the_gas_across_the_seam():
+def test_map_periodic_follows_gas_across_face():
     particles = random_gas(2, seed=3)
     domain, values = unit_domain(2, "periodic"), np.random.default_rng(4).normal(size=(1, 150))
     plane = Plane.through_centre(domain.box, 32)
@@ -172,7 +172,7 @@ def test_a_periodic_map_moves_with_the_gas_across_the_seam():
     np.testing.assert_allclose(after, np.roll(before, 8, axis=1), atol=1e-9)
 
 
-def test_vacuum_is_not_a_number():
+def test_map_vacuum_is_nan():
     particles = gas(np.array([[0.25], [0.5]]), 0.2)
     plane = Plane(np.zeros(2), np.ones(2), (20, 20))
     (found,) = onto_plane(np.array([[2.0]]), particles, unit_domain(2, "open"), KERNEL, plane)
@@ -182,7 +182,7 @@ def test_vacuum_is_not_a_number():
     np.testing.assert_allclose(found[inside], 2.0, rtol=ROUND_OFF)
 
 
-def test_fields_do_not_mix():
+def test_interpolation_of_several_fields_equals_one_by_one():
     particles, domain = random_gas(2), unit_domain(2, "periodic")
     values = np.random.default_rng(6).normal(size=(3, 150))
     plane = Plane.through_centre(domain.box, 16)
@@ -193,7 +193,7 @@ def test_fields_do_not_mix():
         np.testing.assert_allclose(together[f], alone, atol=ROUND_OFF)
 
 
-def test_pixels_are_square_and_the_slice_is_in_the_middle():
+def test_plane_has_square_pixels_and_central_slice():
     plane = Plane.through_centre(np.array([[-1.0, 1.0], [0.0, 0.5], [2.0, 5.0]]), 64)
     assert plane.shape == (64, 16)
     assert plane.height == 3.5

@@ -40,7 +40,7 @@ def kept(particles=None, keeps=(1.0, 1.0), **columns):
     return conservation(history(**columns), particles or state(), scene, Baseline(1.0, 8.0))
 
 
-def test_energy_drift_is_the_last_and_the_largest_of_the_history():
+def test_energy_drift_reports_last_and_largest():
     found = kept()
     assert found["energy_drift"] == 0.01
     assert found["energy_drift_max"] == 0.05
@@ -50,31 +50,31 @@ def test_energy_drift_keeps_its_sign():
     assert kept(energy_drift=[0.0, 0.02, -0.05, -0.01])["energy_drift"] == -0.01
 
 
-def test_injected_energy_is_the_last_over_the_scale_of_the_baseline():
+def test_injected_energy_reported_relative_to_initial_energy():
     assert kept()["energy_injected"] == 0.4 / 8.0
 
 
-def test_the_baseline_is_the_first_row_without_bulk_motion():
+def test_energy_baseline_is_first_row_without_bulk_motion():
     assert baseline(history()) == (8.0, 8.0)
     bound = baseline(history(potential_energy=[-7.0, 0.0, 0.0, 0.0]))
     assert bound == (1.0, 8.0)
 
 
 @pytest.mark.parametrize("axis", ["x", "y"])
-def test_momentum_change_is_the_worst_of_all_steps_and_axes(axis):
+def test_momentum_change_is_largest_over_steps_and_axes(axis):
     column = {f"momentum_{axis}": [1.0, 4.0, -2.0, 1.0]}
     # sum m (|v - bulk| + c) of speeds 3 and 5, whose mean is 4: 1 + 1 + 2 + 2
     assert kept(**column)["momentum_change"] == pytest.approx(3.0 / 6.0, rel=1e-14)
 
 
-def test_momentum_change_does_not_shrink_under_a_boost():
+def test_momentum_change_with_bulk_velocity_unchanged():
     moved = state(velocity=((1003.0, 1005.0), (-70.0, -70.0)))
     column = {"momentum_x": [0.0, 3.0, 0.0, 0.0]}
     # the difference of 1005 and the mean rounds at 1e-13
     assert kept(moved, **column)["momentum_change"] == pytest.approx(3.0 / 6.0, rel=1e-12)
 
 
-def test_axes_that_do_not_keep_momentum_are_left_out():
+def test_momentum_change_ignores_axes_with_walls():
     column = {"momentum_x": [1.0, 4.0, 1.0, 1.0], "momentum_y": [0.0, 0.0, 0.0, -1.0]}
     # along x the mean motion of 4 is none that could be taken off: speeds 3 and 5
     found = kept(keeps=(0.0, 1.0), **column)["momentum_change"]
@@ -86,7 +86,7 @@ def test_axes_that_do_not_keep_momentum_are_left_out():
     ("ratio", "last", "worst"),
     [([1.0, 0.8, 1.1, 0.99], 0.99, 0.8), ([1.0, 0.9, 1.3, 1.01], 1.01, 1.3)],
 )
-def test_volume_ratio_is_the_last_and_that_farthest_from_one(ratio, last, worst):
+def test_volume_ratio_reports_last_and_farthest_from_one(ratio, last, worst):
     found = kept(volume_ratio=ratio)
     assert (found["volume_ratio"], found["volume_ratio_worst"]) == (last, worst)
     assert kept()["volume_ratio"] is None

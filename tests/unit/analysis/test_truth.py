@@ -77,12 +77,12 @@ def at_start(what) -> SimpleNamespace:
     )
 
 
-def test_every_problem_says_how_long_it_holds():
+def test_every_problem_states_end_of_exact_solution():
     assert {case[0] for case in ENDS.values()} | FOR_EVER == set(PROBLEMS)
 
 
 @pytest.mark.parametrize("case", ENDS)
-def test_it_holds_until_then_and_is_refused_afterwards(case):
+def test_exact_solution_available_until_its_end_only(case):
     problem, overrides, end, reason = ENDS[case]
     here = made(problem, *overrides)
     # the numbers above have four digits
@@ -98,7 +98,7 @@ def test_it_holds_until_then_and_is_refused_afterwards(case):
 
 
 @pytest.mark.parametrize("problem", sorted(FOR_EVER))
-def test_what_is_steady_or_unknown_holds_for_ever(problem):
+def test_exact_solution_steady_never_ends(problem):
     assert truth.departure(made(problem), 1e4) is None
 
 
@@ -111,7 +111,7 @@ def test_what_is_steady_or_unknown_holds_for_ever(problem):
     ],
     ids=lambda other: next(iter(other)),
 )
-def test_no_exact_solution_has_a_field_or_heating(problem, other):
+def test_exact_solution_with_field_or_heating_is_missing(problem, other):
     small = () if problem == "particles" else ("problem.n=100",)
     plain = made(problem, *small)
     # set on the table itself: a configuration refuses a point mass in a periodic box
@@ -134,7 +134,7 @@ def test_no_exact_solution_has_a_field_or_heating(problem, other):
 
 
 @pytest.mark.parametrize("field", ["mass = 1.1", "mass = 1.0, softening = 0.01"])
-def test_a_ring_goes_round_its_own_mass_alone(field):
+def test_ring_exact_solution_needs_its_central_mass_only(field):
     other = made("keplerian_ring", f'physics.external={{ name = "point_mass", {field} }}')
     assert "point mass of 1" in truth.departure(other, 1.0)
     own = made("keplerian_ring", 'physics.external={ name = "point_mass", mass = 1.0 }')
@@ -142,7 +142,7 @@ def test_a_ring_goes_round_its_own_mass_alone(field):
 
 
 @pytest.mark.parametrize("dimension", [1, 2, 3])
-def test_gas_that_falls_in_must_be_cold(dimension):
+def test_implosion_exact_solution_needs_cold_gas(dimension):
     # (gamma - 1)/2 4^D behind, and ahead of it p times 4^(5/3 (D - 1))
     limit = 1e-3 * 4.0**dimension / 3.0 / 4.0 ** (5 / 3 * (dimension - 1))
     cold, warm = (
@@ -153,7 +153,7 @@ def test_gas_that_falls_in_must_be_cold(dimension):
     assert "cold gas" in truth.departure(warm, 0.1)
 
 
-def test_a_run_beyond_the_implosion_is_compared_with_a_finer_one_everywhere():
+def test_implosion_after_end_has_whole_domain_as_error_region():
     noh = made("noh").problem
     x = np.array([[0.1, 0.9]])
     inside, words = noh.error_region(made("noh").physics.eos_model(), 1.2, x)
@@ -161,7 +161,7 @@ def test_a_run_beyond_the_implosion_is_compared_with_a_finer_one_everywhere():
     assert words == "the whole domain"
 
 
-def test_errors_leave_out_what_the_ends_have_disturbed():
+def test_error_region_excludes_waves_from_ends():
     tube = made("shock_tube", "problem.boundary=periodic")
     problem, eos = tube.problem, tube.physics.eos_model()
     x = np.linspace(-0.499, 0.499, 999)[None]
@@ -178,7 +178,7 @@ def test_errors_leave_out_what_the_ends_have_disturbed():
     assert truth.region(quiet.problem, eos, 0.1, x)[1] == "-0.2 < x < 0.3"
 
 
-def test_figures_of_a_tube_leave_out_what_the_ends_have_disturbed():
+def test_tube_figures_exclude_waves_from_ends():
     tube = made("shock_tube", "problem.boundary=periodic", "problem.n=400")
     eos, start = tube.physics.eos_model(), at_start(tube)
     x = start.position[0]
@@ -191,7 +191,7 @@ def test_figures_of_a_tube_leave_out_what_the_ends_have_disturbed():
     assert found["peak_density"] == 9.0  # of the gas that there is
 
 
-def test_uniform_gas_is_undisturbed_along_every_axis():
+def test_uniform_gas_error_region_is_whole_domain():
     gas = made("uniform", "problem.boundary=['periodic', 'open']", "problem.velocity=[0.3, 0.5]")
     problem, eos = gas.problem, gas.physics.eos_model()
     low, high = 0.1 * (0.5 + 1.18322), 1.0 + 0.1 * (0.5 - 1.18322)
@@ -205,7 +205,7 @@ def test_uniform_gas_is_undisturbed_along_every_axis():
     assert np.isinf(moving.problem.undisturbed(eos, 1e3)).all()
 
 
-def test_a_wave_of_rounded_digits_is_none():
+def test_wave_of_round_off_is_ignored():
     # the slow shock of the stress suite: its left wave, of 4e-4, would meet the end's at t = 0.258
     tube = made(
         "shock_tube", "problem.domain=[-1.0, 3.0]", "problem.boundary=open",
@@ -216,13 +216,13 @@ def test_a_wave_of_rounded_digits_is_none():
 
 
 @pytest.mark.parametrize("boundary", ["mirror", "periodic"])
-def test_a_contact_alone_stays_for_ever(boundary):
+def test_contact_alone_exact_solution_never_ends(boundary):
     tube = made("shock_tube", "problem.right.pressure=1.0", f"problem.boundary={boundary}")
     assert truth.departure(tube, 1e3) is None
 
 
 @pytest.mark.parametrize("name", ["blast_waves", "shu_osher", "shock_tube"])
-def test_what_another_method_computed_is_not_called_exact(name):
+def test_finite_volume_solution_is_not_called_exact(name):
     made_config = made(name, "problem.n=100")
     state = at_start(made_config)
     found = errors.against_exact(made_config, 0.0, state, np.ones(state.mass.size))
@@ -239,7 +239,7 @@ def test_what_another_method_computed_is_not_called_exact(name):
         (0.5, "gravity", True, ["report"]),
     ],
 )
-def test_figures_are_asked_for_where_they_mean_something(time, departs, with_history, asked):
+def test_figures_requested_only_where_meaningful(time, departs, with_history, asked):
     problem = SimpleNamespace(
         departs=lambda physics: departs, exact_ends=lambda eos: (0.5, "it breaks"),
         report=lambda *given: {"report": given}, compare=lambda *given: {"compare": given},
@@ -254,7 +254,7 @@ def test_figures_are_asked_for_where_they_mean_something(time, departs, with_his
     assert found.get("over_time", ("eos", history)) == ("eos", history)
 
 
-def test_the_region_in_words_names_the_axes_with_ends_alone():
+def test_error_region_text_names_only_axes_with_ends():
     gas = made("uniform", "problem.boundary=['periodic', 'open']")
     inside, words = truth.region(
         gas.problem, gas.physics.eos_model(), 0.1, np.array([[0.5, 0.5], [0.5, 0.1]])

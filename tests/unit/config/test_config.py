@@ -40,7 +40,7 @@ def default(*overrides):
 # --- what it resolves to ----------------------------------------------------------------------
 
 
-def test_defaults_of_the_tables_and_of_the_problem():
+def test_defaults_come_from_tables_and_problem():
     found = default()
     assert found.physics.scheme == "grad_h"
     assert found.physics.C == 0.15
@@ -50,7 +50,7 @@ def test_defaults_of_the_tables_and_of_the_problem():
     assert found.output.interval == shock_tube.defaults["output.interval"]
 
 
-def test_a_problem_default_lies_under_the_users_value(monkeypatch):
+def test_problem_default_yields_to_user_value(monkeypatch):
     shock_tube = registry.load("sph.problems", "shock_tube").Problem
     monkeypatch.setattr(
         shock_tube, "defaults", {"physics.gamma": 3.0, "time.end": 7.0, "output.interval": 1.0}
@@ -60,7 +60,7 @@ def test_a_problem_default_lies_under_the_users_value(monkeypatch):
     assert (found.physics.gamma, found.time.end) == (2.0, 7.0)
 
 
-def test_a_problem_default_gives_way_to_what_stands_in_its_place(monkeypatch):
+def test_problem_default_yields_to_alternative_key(monkeypatch):
     shock_tube = registry.load("sph.problems", "shock_tube").Problem
     monkeypatch.setitem(shock_tube.defaults, "physics.gamma", 3.0)
     found = config.from_text(MINIMAL + '[physics]\neos = { name = "ideal_gas", gamma = 2 }\n')
@@ -68,7 +68,7 @@ def test_a_problem_default_gives_way_to_what_stands_in_its_place(monkeypatch):
     assert found.physics.eos_model().gamma == 2.0
 
 
-def test_a_member_that_is_set_keeps_the_rest_of_its_table(tmp_path):
+def test_override_of_member_keeps_rest_of_table(tmp_path):
     path = tmp_path / "minimal.toml"
     path.write_text(MINIMAL)
     for found in (default("problem.left.density=5"), config.load(path, ["problem.left.density=5"])):
@@ -84,23 +84,22 @@ def test_a_member_that_is_set_keeps_the_rest_of_its_table(tmp_path):
         "[problem.right]\ndensity = 1.0",
     ],
 )
-def test_a_table_in_the_file_must_be_complete(tmp_path, table):
+def test_incomplete_table_in_file_is_refused(messages, tmp_path, table):
     path = tmp_path / "half.toml"
     path.write_text(MINIMAL + table + "\n")
-    message = "problem.right.pressure is missing: expected a number greater than 0"
-    with pytest.raises(ConfigError, match=message):
+    with messages.raised(ConfigError, "problem.right.pressure"):
         config.load(path)
-    with pytest.raises(ConfigError, match=message):  # nor does setting another member fill it
+    with messages.raised(ConfigError, "problem.right.pressure"):  # setting another fills no gap
         config.load(path, ["problem.right.velocity=1"])
     assert config.load(path, ["problem.right.pressure=0.2"]).problem.right.pressure == 0.2
 
 
-def test_a_table_that_is_set_must_be_complete():
-    with pytest.raises(ConfigError, match=r"problem\.right\.pressure is missing"):
+def test_incomplete_table_in_override_is_refused(messages):
+    with messages.raised(ConfigError, "problem.right"):
         default("problem.right={density=1.0}")
 
 
-def test_whole_numbers_become_the_floats_that_are_meant():
+def test_integer_for_float_becomes_float():
     found = default("physics.alpha=1", "physics.gamma=2", "problem.domain=[-1, 1]")
     values = [found.physics.alpha, found.physics.gamma, *found.problem.domain]
     assert values == [1, 2, -1, 1]
@@ -113,7 +112,7 @@ def viscosity_of(*overrides):
     return found
 
 
-def test_models():
+def test_models_from_scalar_settings():
     physics = default("physics.gamma=2").physics
     assert type(physics.kernel_model()) is registry.model_class("sph.kernels", "wendland_c2")
     assert physics.eos_model() == registry.model_class("sph.eos", "ideal_gas")(2.0)
@@ -122,7 +121,7 @@ def test_models():
     assert type(viscosity.alpha) is float
 
 
-def test_models_of_tables():
+def test_models_from_tables():
     physics = default(
         "physics.kernel={name = 'cubic_spline', flattened = true}",
         "physics.eos={name = 'ideal_gas', gamma = 3}",
@@ -147,11 +146,11 @@ PAIRS = '[problem]\nname = "uniform"\n[physics]\nkernel = "cubic_spline"\n'
     [("cubic_spline", 2, 1.41, "1.4"), ("cubic_spline", 3, 1.6, "1.2"),
      ("quintic_spline", 2, 2.2, "1.8"), ("quintic_spline", 3, 1.7, "1.6")],
 )  # fmt: skip
-def test_a_kernel_is_refused_where_its_particles_pair(tmp_path, kernel, dimension, eta, limit):
+def test_kernel_at_pairing_eta_is_refused(messages, tmp_path, kernel, dimension, eta, limit):
     path = tmp_path / "a.toml"
     path.write_text(PAIRS)
     keys = (f"physics.kernel={kernel}", f"problem.dimension={dimension}", f"physics.eta={eta}")
-    with pytest.raises(ConfigError, match=rf"physics\.kernel = .*{dimension}-D, .* above {limit}"):
+    with messages.raised(ConfigError):
         config.load(path, keys)
     assert config.load(path, (*keys, "physics.allow_pairing=true")).physics.eta == eta
     assert config.load(path, (*keys, f"physics.eta={limit}")).physics.eta == float(limit)
@@ -160,26 +159,24 @@ def test_a_kernel_is_refused_where_its_particles_pair(tmp_path, kernel, dimensio
         assert config.load(path, (*keys, f"physics.kernel={other}")).physics.eta == eta
 
 
-def test_the_error_names_the_line_and_what_to_try(tmp_path):
+def test_config_error_has_line_and_suggestion(messages, tmp_path):
     path = tmp_path / "a.toml"
     path.write_text(PAIRS)
-    with pytest.raises(ConfigError) as error:
+    suggestion = "physics.allow_pairing = true"
+    with messages.raised(ConfigError, f"{path}, line 4: physics.kernel = ", suggestion):
         config.load(path)
-    assert str(error.value).startswith(f"{path}, line 4: physics.kernel = ")
-    assert "physics.allow_pairing = true" in str(error.value)
-    assert "Wendland" in str(error.value)
 
 
-def test_a_run_that_exists_stays_readable_but_not_with_changes():
+def test_existing_run_with_refused_kernel_readable_but_not_changeable(messages):
     found = config.from_text(PAIRS)
     assert found.physics.kernel == {"name": "cubic_spline", "flattened": False}
-    with pytest.raises(ConfigError, match="close pairs"):
+    with messages.raised(ConfigError):
         found.override(["time.end=2"])
     assert found.override(["time.end=2", "physics.allow_pairing=true"]).time.end == 2.0
 
 
 @pytest.mark.parametrize("value", ["1", "7", "converged"])
-def test_density_passes_are_a_count_or_a_word(value):
+def test_density_passes_accepts_count_or_converged(value):
     assert str(default(f"physics.density_passes={value}").physics.density_passes) == value
 
 
@@ -203,7 +200,7 @@ def test_resolved_text_reads_back_equal(overrides):
     assert overrides == () or found != default()
 
 
-def test_resolved_text_names_every_key_in_its_order():
+def test_resolved_text_has_every_key_in_order():
     text = default().to_toml()
     keys = [line.split(" = ")[0] for line in text.splitlines() if " = " in line]
     sections = [default().problem, default().physics, default().time, default().output]
@@ -217,7 +214,7 @@ def test_resolved_text_names_every_key_in_its_order():
     assert keys == declared
 
 
-def test_run_may_be_left_out():
+def test_run_table_may_be_omitted():
     found = default("run.threads=1")
     text = found.to_toml(include_run=False)
     assert "[run]" not in text
@@ -225,7 +222,7 @@ def test_run_may_be_left_out():
 
 
 @pytest.mark.parametrize("problem", registry.names("sph.problems"))
-def test_template_reads_back_as_the_default_and_explains_every_key(problem):
+def test_template_reads_back_as_default_and_explains_every_key(problem):
     text = config.template(problem)
     plain = config.from_text(f'[problem]\nname = "{problem}"\n')
     assert config.from_text(text) == plain
@@ -242,15 +239,15 @@ def test_template_reads_back_as_the_default_and_explains_every_key(problem):
     assert "of at least 0 or a table { min, max, switch, ell }; default" in words
 
 
-def test_template_of_no_problem_names_the_nearest():
-    with pytest.raises(ConfigError, match='problem "shock_tub"; did you mean shock_tube'):
+def test_template_unknown_problem_names_nearest(messages):
+    with messages.raised(ConfigError):
         config.template("shock_tub")
 
 
 # --- overrides --------------------------------------------------------------------------------
 
 
-def test_an_override_replaces_adds_and_merges(tmp_path):
+def test_override_replaces_adds_and_merges(tmp_path):
     path = tmp_path / "a.toml"
     path.write_text(MINIMAL + "[physics]\nalpha = { min = 0.1, max = 2.0 }\n")
     found = config.load(path, ["physics.alpha.max=3", "time.end=9", "physics.kernel=cubic_spline"])
@@ -259,296 +256,184 @@ def test_an_override_replaces_adds_and_merges(tmp_path):
     assert found.physics.kernel == {"name": "cubic_spline", "flattened": False}
 
 
-def test_the_last_override_of_a_key_counts():
+def test_override_repeated_last_one_wins():
     assert default("time.end=1", "time.end=2").time.end == 2.0
 
 
-def test_an_override_may_change_the_problem(tmp_path):
+def test_override_of_problem_name_changes_problem(tmp_path):
     path = tmp_path / "a.toml"
     path.write_text('[problem]\nname = "nonsense"\n')
     assert config.load(path, ["problem.name=shock_tube"]) == default()
 
 
-def test_an_override_leaves_the_original_alone():
+def test_override_leaves_original_unchanged():
     before = default("problem.left.density=2")
     before.override(["problem.left.density=3", "physics.alpha={min=0, max=1}"])
     assert before == default("problem.left.density=2")
 
 
-def test_an_override_takes_the_place_of_the_files_gamma_and_back():
+def test_override_of_eos_replaces_gamma_and_back():
     changed = default("physics.eos={name='ideal_gas', gamma=1.9}")
     assert changed.physics.gamma is None
     assert changed.override(["physics.gamma=1.3"]).physics.eos is None
 
 
 @pytest.mark.parametrize("override", ["physics.alpha", "=3", "physics..alpha=3", "physics.=3"])
-def test_an_override_without_the_form_of_one(override):
-    assert errors(MINIMAL, [override]) == [f"--set {override}: expected TABLE.KEY=VALUE"]
+def test_override_malformed_is_refused(messages, override):
+    message = only_error(MINIMAL, [override])
+    assert message.startswith(f"--set {override}: ")
+    messages.check(message)
 
 
-def test_an_override_is_named_where_it_is_wrong(tmp_path):
+def test_override_invalid_is_named_as_source(messages, tmp_path):
     text = MINIMAL + "[physics]\nalpha = { min = 0.1, max = 2.0 }\ngamma = 0.5\n"
     found = errors(text, ["physics.alpha={min = 0, max = 'a'}"], tmp_path / "a.toml")
-    assert found == [
-        f"{tmp_path}/a.toml, line 5: physics.gamma = 0.5: expected a number greater than 1",
-        "--set physics.alpha={min = 0, max = 'a'}: physics.alpha.max = \"a\": "
-        "expected a number of at least 0",
-    ]
+    places = (
+        f"{tmp_path}/a.toml, line 5: physics.gamma",
+        "--set physics.alpha={min = 0, max = 'a'}: ",
+    )
+    assert [line.startswith(place) for line, place in zip(found, places, strict=True)] == [True] * 2
+    messages.check("\n".join(found))
 
 
 # --- errors -----------------------------------------------------------------------------------
 
-# the text after [problem] and its name (lines 1 and 2), and the message it must lead to
+# the text after [problem] and its name (lines 1 and 2), and the line and key of its one error
 WRONG = {
-    "type": ("n = 1.5", "line 3: problem.n = 1.5: expected a whole number from 2 to 100000000"),
-    "bool for int": (
-        "n = true",
-        "line 3: problem.n = true: expected a whole number from 2 to 100000000",
-    ),
-    "string for number": (
-        '[physics]\neta = "1"',
-        'line 4: physics.eta = "1": expected a number greater than 0',
-    ),
-    "bool for number": (
-        "[physics]\n\nalpha = true",
-        "line 5: physics.alpha = true: expected a number of at least 0 or a table "
-        "{ min, max, switch, ell }",
-    ),
-    "number for bool": (
-        "[physics]\nbalsara = 1",
-        "line 4: physics.balsara = 1: expected true or false",
-    ),
-    "bound": (
-        "[physics]\ngamma = 1",
-        "line 4: physics.gamma = 1: expected a number greater than 1",
-    ),
-    "negative": (
-        "[physics]\nalpha = -0.1",
-        "line 4: physics.alpha = -0.1: expected a number of at least 0 or a table "
-        "{ min, max, switch, ell }",
-    ),
-    "zero": ("[time]\nend = 0", "line 4: time.end = 0: expected a number greater than 0"),
-    "count or word": (
-        "[physics]\ndensity_passes = 0",
-        'line 4: physics.density_passes = 0: expected a whole number from 1 to 100 or "converged"',
-    ),
-    "wrong word": (
-        '[physics]\ndensity_passes = "convergd"',
-        'line 4: physics.density_passes = "convergd": expected a whole number from 1 to 100 or '
-        '"converged"; did you mean "converged"?',
-    ),
-    "threads": (
-        "[run]\nthreads = 0",
-        'line 4: run.threads = 0: expected a whole number of at least 1 or "all"',
-    ),
-    "infinite": (
-        "[output]\ninterval = inf",
-        "line 4: output.interval = inf: expected a finite number",
-    ),
-    "undefined, deep": (
-        "left = { density = nan }",
-        "line 3: problem.left.density = nan: expected a finite number",
-    ),
-    "too large for a float": (
-        f"[time]\nend = {'9' * 400}",
-        f"line 4: time.end = {'9' * 57}...: expected a number greater than 0",
-    ),
-    "dotted key": (
-        "[physics]\nalpha.min = 0\nalpha.max = -1",
-        "line 5: physics.alpha.max = -1: expected a number of at least 0",
-    ),
-    "table header": (
-        "[physics.alpha]\nmin = 2\nmax = 1",
-        "line 4: physics.alpha.min = 2.0: expected at most max = 1.0",
-    ),
+    "type": ("n = 1.5", 3, "problem.n"),
+    "bool for int": ("n = true", 3, "problem.n"),
+    "string for number": ('[physics]\neta = "1"', 4, "physics.eta"),
+    "bool for number": ("[physics]\n\nalpha = true", 5, "physics.alpha"),
+    "number for bool": ("[physics]\nbalsara = 1", 4, "physics.balsara"),
+    "bound": ("[physics]\ngamma = 1", 4, "physics.gamma"),
+    "negative": ("[physics]\nalpha = -0.1", 4, "physics.alpha"),
+    "zero": ("[time]\nend = 0", 4, "time.end"),
+    "count or word": ("[physics]\ndensity_passes = 0", 4, "physics.density_passes"),
+    "wrong word": ('[physics]\ndensity_passes = "convergd"', 4, "physics.density_passes"),
+    "threads": ("[run]\nthreads = 0", 4, "run.threads"),
+    "infinite": ("[output]\ninterval = inf", 4, "output.interval"),
+    "undefined, deep": ("left = { density = nan }", 3, "problem.left.density"),
+    "too large for a float": (f"[time]\nend = {'9' * 400}", 4, "time.end"),
+    "dotted key": ("[physics]\nalpha.min = 0\nalpha.max = -1", 5, "physics.alpha.max"),
+    "table header": ("[physics.alpha]\nmin = 2\nmax = 1", 4, "physics.alpha.min"),
     "wrong switch": (
         '[physics.alpha]\nmin = 1\nmax = 2\nswitch = "cullen"',
-        'line 6: physics.alpha.switch = "cullen": expected one of "cullen_dehnen", '
-        '"morris_monaghan"; did you mean "cullen_dehnen"?',
+        6,
+        "physics.alpha.switch",
     ),
     "parameter of another switch": (
         "[physics.alpha]\nmin = 1\nmax = 2\nell = 0.1",
-        'line 6: physics.alpha.ell is not a parameter of the switch "morris_monaghan"',
+        6,
+        "physics.alpha.ell",
     ),
-    "inline table, missing": (
-        "[physics]\nalpha = { min = 0 }",
-        "line 4: physics.alpha.max is missing: expected a number of at least 0",
-    ),
-    "multi-line list": (
-        'domain = [\n  -1,\n  "a" ]',
-        'line 3: problem.domain[1] = "a": expected a number or a list of these',
-    ),
-    "list of lists": (
-        'domain = [[0, "a"]]',
-        'line 3: problem.domain[0][1] = "a": expected a number',
-    ),
-    "name in a union": (
-        'boundary = "miror"',
-        'line 3: problem.boundary = "miror": expected "periodic", "mirror" or "open", '
-        'or a list of these; did you mean "mirror"?',
-    ),
-    "unknown key": (
-        "[physics]\ngama = 1.4",
-        "line 4: physics.gama is not a key of [physics]; did you mean gamma?",
-    ),
-    "unknown key, case": (
-        "[physics]\nc = 0.1",
-        "line 4: physics.c is not a key of [physics]; did you mean C?",
-    ),
-    "unknown key, all capitals": (
-        "[physics]\nBALSARA = true",
-        "line 4: physics.BALSARA is not a key of [physics]; did you mean balsara?",
-    ),
-    "unknown key, unlike any": (
-        "[time]\nzzz = 1",
-        "line 4: time.zzz is not a key of [time]; expected one of end",
-    ),
+    "inline table, missing": ("[physics]\nalpha = { min = 0 }", 4, "physics.alpha.max"),
+    "multi-line list": ('domain = [\n  -1,\n  "a" ]', 3, "problem.domain[1]"),
+    "list of lists": ('domain = [[0, "a"]]', 3, "problem.domain[0][1]"),
+    "name in a union": ('boundary = "miror"', 3, "problem.boundary"),
+    "unknown key": ("[physics]\ngama = 1.4", 4, "physics.gama"),
+    "unknown key, case": ("[physics]\nc = 0.1", 4, "physics.c"),
+    "unknown key, all capitals": ("[physics]\nBALSARA = true", 4, "physics.BALSARA"),
+    "unknown key, unlike any": ("[time]\nzzz = 1", 4, "time.zzz"),
     "unknown key, deep": (
         "left = { density = 1, pressure = 1, velocty = 1 }",
-        "line 3: problem.left.velocty is not a key of [problem.left]; did you mean velocity?",
+        3,
+        "problem.left.velocty",
     ),
-    "key of another table": (
-        "alpha = 1",
-        "line 3: problem.alpha is not a key of [problem]: alpha belongs in [physics]",
-    ),
-    "unknown table": (
-        "[phisics]\nalpha = 1",
-        "line 3: phisics is not a table of the configuration; did you mean physics?",
-    ),
-    "table for a number": (
-        "[time]\nend = { a = 1 }",
-        "line 4: time.end = { a = 1 }: expected a number greater than 0",
-    ),
-    "array of tables": (
-        "[[time]]\nend = 1",
-        "line 3: time = [{ end = 1 }]: expected a table [time]",
-    ),
-    "unknown kernel": (
-        '[physics]\nkernel = "wendland_c3"',
-        f'line 4: physics.kernel = "wendland_c3": expected one of {KERNELS}, '
-        'or a table { name, parameters }; did you mean "wendland_c6"?',
-    ),
+    "key of another table": ("alpha = 1", 3, "problem.alpha"),
+    "unknown table": ("[phisics]\nalpha = 1", 3, "phisics"),
+    "table for a number": ("[time]\nend = { a = 1 }", 4, "time.end"),
+    "array of tables": ("[[time]]\nend = 1", 3, "time"),
+    "unknown kernel": ('[physics]\nkernel = "wendland_c3"', 4, "physics.kernel"),
     "unknown kernel in a table": (
         '[physics]\nkernel = { name = "cubc_spline" }',
-        f'line 4: physics.kernel.name = "cubc_spline": expected one of {KERNELS}; '
-        'did you mean "cubic_spline"?',
+        4,
+        "physics.kernel.name",
     ),
     "kernel table without a name": (
         "[physics]\nkernel = { flattened = true }",
-        f"line 4: physics.kernel.name is missing: expected one of {KERNELS}",
+        4,
+        "physics.kernel.name",
     ),
     "unknown kernel parameter": (
         '[physics]\nkernel = { name = "cubic_spline", flatened = true }',
-        "line 4: physics.kernel.flatened is not a key of [cubic_spline]; did you mean flattened?",
+        4,
+        "physics.kernel.flatened",
     ),
     "type of a kernel parameter": (
         '[physics]\nkernel = { name = "cubic_spline", flattened = 1 }',
-        "line 4: physics.kernel.flattened = 1: expected true or false",
+        4,
+        "physics.kernel.flattened",
     ),
-    "kernel that is no name": (
-        "[physics]\nkernel = 3",
-        f"line 4: physics.kernel = 3: expected one of {KERNELS}, or a table {{ name, parameters }}",
-    ),
+    "kernel that is no name": ("[physics]\nkernel = 3", 4, "physics.kernel"),
     "bound of an eos parameter": (
         '[physics]\neos = { name = "ideal_gas", gamma = 1 }',
-        "line 4: physics.eos.gamma = 1: expected a number greater than 1",
+        4,
+        "physics.eos.gamma",
     ),
-    "missing eos parameter": (
-        '[physics]\neos = { name = "ideal_gas" }',
-        "line 4: physics.eos.gamma is missing: expected a number greater than 1",
-    ),
+    "missing eos parameter": ('[physics]\neos = { name = "ideal_gas" }', 4, "physics.eos.gamma"),
     "eos and gamma": (
         '[physics]\ngamma = 1.4\neos = { name = "ideal_gas", gamma = 1.4 }',
-        "line 5: physics.eos replaces physics.gamma, but both are given: "
-        "expected only one of the two",
+        5,
+        "physics.eos",
     ),
-    "domain upside down": (
-        "domain = [1, 0]",
-        "line 3: problem.domain = [1, 0]: expected lo < hi",
-    ),
+    "domain upside down": ("domain = [1, 0]", 3, "problem.domain"),
     "domain upside down, on which another key's check relies": (
         "domain = [2, 0]\ndiscontinuity = 0.9",
-        "line 3: problem.domain = [2, 0]: expected lo < hi",
+        3,
+        "problem.domain",
     ),
-    "domain of too many axes": (
-        "domain = [[-1, 1], [-1, 1]]",
-        "line 3: problem.domain = [[-1, 1], [-1, 1]]: expected [lo, hi] for all axes in 1-D",
-    ),
-    "domain of too few axes": (
-        "domain = [[-1, 1], [-1, 1]]\ndimension = 3",
-        "line 3: problem.domain = [[-1, 1], [-1, 1]]: expected [lo, hi] for all axes, "
-        "or a list with one [lo, hi] per axis in 3-D",
-    ),
-    "ragged domain": (
-        "dimension = 2\ndomain = [[-1, 1], 3]",
-        "line 4: problem.domain = [[-1, 1], 3]: expected [lo, hi] for all axes, "
-        "or a list with one [lo, hi] per axis in 2-D",
-    ),
-    "empty domain": (
-        "domain = []",
-        "line 3: problem.domain = []: expected [lo, hi] for all axes in 1-D",
-    ),
-    "too few boundaries": (
-        'dimension = 2\nboundary = ["open"]',
-        'line 4: problem.boundary = ["open"]: expected one boundary for all axes, '
-        "or a list of 2, one per axis",
-    ),
+    "domain of too many axes": ("domain = [[-1, 1], [-1, 1]]", 3, "problem.domain"),
+    "domain of too few axes": ("domain = [[-1, 1], [-1, 1]]\ndimension = 3", 3, "problem.domain"),
+    "ragged domain": ("dimension = 2\ndomain = [[-1, 1], 3]", 4, "problem.domain"),
+    "empty domain": ("domain = []", 3, "problem.domain"),
+    "too few boundaries": ('dimension = 2\nboundary = ["open"]', 4, "problem.boundary"),
 }
 
 
-@pytest.mark.parametrize(("text", "message"), WRONG.values(), ids=WRONG)
-def test_one_error_one_message(text, message):
-    assert only_error(MINIMAL + text) == f"x.toml, {message}"
+@pytest.mark.parametrize(("text", "line", "key"), WRONG.values(), ids=WRONG)
+def test_each_error_gives_one_message(messages, text, line, key):
+    message = only_error(MINIMAL + text)
+    assert re.match(rf"x\.toml, line {line}: {re.escape(key)}(?![\w.])", message)
+    messages.check(message)
 
 
-def test_unknown_scheme_names_the_nearest():
-    message = only_error(MINIMAL + '[physics]\nscheme = "grad_hh"')
-    assert message.startswith('x.toml, line 4: physics.scheme = "grad_hh": expected one of ')
-    assert message.endswith('did you mean "grad_h"?')
+# a whole text, and where its one error is and about what
+ALONE = {
+    "unknown scheme": (MINIMAL + '[physics]\nscheme = "grad_hh"', ", line 4", "physics.scheme"),
+    "unknown problem": ('[problem]\nname = "shock_tub"\n', ", line 2", "problem.name"),
+    "problem name of the wrong type": ("[problem]\nname = 3\n", ", line 2", "problem.name"),
+    "no problem": ("", "", "problem.name"),
+    "key outside its table": ("eta = 1\n" + MINIMAL, ", line 1", "eta"),
+    "key outside all tables": ("zzz = 1\n" + MINIMAL, ", line 1", "zzz"),
+    "a problem's own check": (
+        "# a gas\n" + MINIMAL + "discontinuity = 9.0", ", line 2", "problem: discontinuity",
+    ),
+}  # fmt: skip
 
 
-def test_a_problem_that_does_not_exist():
-    message = only_error('[problem]\nname = "shock_tub"\n')
-    expected = 'problem.name = "shock_tub" is not a problem; did you mean shock_tube?'
-    assert message == f"x.toml, line 2: {expected}"
+@pytest.mark.parametrize(("text", "place", "key"), ALONE.values(), ids=ALONE)
+def test_error_of_whole_text_gives_one_message(messages, text, place, key):
+    message = only_error(text)
+    assert message.startswith(f"x.toml{place}: {key} ")
+    messages.check(message)
 
 
-def test_a_problem_name_of_the_wrong_type():
-    message = only_error("[problem]\nname = 3\n")
-    assert message == "x.toml, line 2: problem.name = 3: expected a string"
-
-
-def test_no_problem_at_all_is_one_error():
-    valid = ", ".join(registry.names("sph.problems"))
-    assert only_error("") == f"x.toml: problem.name is missing: expected one of {valid}"
-
-
-def test_a_key_outside_the_tables():
-    assert only_error("eta = 1\n" + MINIMAL) == (
-        "x.toml, line 1: eta is not a table but a key of [physics]"
-    )
-    assert only_error("zzz = 1\n" + MINIMAL).startswith("x.toml, line 1: zzz is outside")
-
-
-def test_a_key_without_any_default_must_be_given(monkeypatch):
+def test_required_key_missing_is_refused(messages, monkeypatch):
     shock_tube = registry.load("sph.problems", "shock_tube").Problem
     monkeypatch.delitem(shock_tube.defaults, "time.end")
-    message = "time.end is missing: expected a number greater than 0"
-    assert only_error(MINIMAL) == f"x.toml: {message}"
-    assert only_error(MINIMAL + "[output]\n[time]\n") == f"x.toml, line 4: {message}"
+    for text, place in ((MINIMAL, ""), (MINIMAL + "[output]\n[time]\n", ", line 4")):
+        message = only_error(text)
+        assert message.startswith(f"x.toml{place}: time.end ")
+        messages.check(message)
 
 
-def test_a_check_of_the_problem_itself_is_passed_on():
-    message = only_error("# a gas\n" + MINIMAL + "discontinuity = 9.0")
-    assert message.startswith("x.toml, line 2: problem: discontinuity = 9.0: ")
-
-
-def test_no_override_of_a_run_names_the_run():
+def test_override_of_run_refused_names_run(messages):
     message = only_error(MINIMAL, ["physics.alpha=x"])
-    assert message.startswith('--set physics.alpha=x: physics.alpha = "x": expected a number')
+    assert message.startswith("--set physics.alpha=x: physics.alpha ")
+    messages.check(message)
 
 
-def test_all_errors_at_once_in_the_order_of_the_lines(tmp_path):
+def test_all_errors_reported_at_once_in_line_order(messages, tmp_path):
     text = """\
 n = 3
 [time]
@@ -570,14 +455,15 @@ interval = 1
     lines = [f"line {line}" for line in (1, 3, 6, 7, 8, 10, 10, 10, 11, 12, 13)]
     assert sorted(places[:9]) == sorted(lines[:9])
     assert places == [*lines, "--set run.threads=-1"]
+    messages.check("\n".join(found))
 
 
-def test_the_other_tables_are_checked_where_the_problem_is_unknown():
+def test_unknown_problem_other_tables_still_checked():
     found = errors('[problem]\nname = "x"\n[physics]\neta = 0\n')
     assert [line.split(": ")[0] for line in found] == ["x.toml, line 2", "x.toml, line 4"]
 
 
-def test_no_message_speaks_the_libraries_language():
+def test_messages_hide_library_wording(messages):
     text = MINIMAL + "\n".join(
         ["n = {}", "domain = 3", "left = 1", "[physics]", "alpha = []", "kernel = 1.5", "eos = 2"]
     )
@@ -585,6 +471,7 @@ def test_no_message_speaks_the_libraries_language():
     assert len(found.splitlines()) == 6
     for word in ("Input", "valid", "pydantic", "dict", "int", "float", "None"):
         assert not re.search(rf"\b{word}\b", found)
+    messages.check(found)
 
 
 @pytest.mark.parametrize(
@@ -595,35 +482,33 @@ def test_no_message_speaks_the_libraries_language():
         ("a = 1\na = 2\n", "line 2, column 6"),
     ],
 )
-def test_what_is_not_toml(text, place):
-    assert only_error(text).startswith(f"x.toml, {place}: not valid TOML: ")
+def test_invalid_toml_is_refused_with_line(messages, text, place):
+    message = only_error(text)
+    assert message.startswith(f"x.toml, {place}: ")
+    messages.check(message, mask=r"(?<=TOML: ).*")  # the words of Python's own reader
 
 
 # --- files ------------------------------------------------------------------------------------
 
 
-def test_a_file_loads_with_its_byte_order_mark_and_line_ends(tmp_path):
+def test_file_with_byte_order_mark_and_crlf_loads(tmp_path):
     path = tmp_path / "a.toml"
     path.write_bytes(b"\xef\xbb\xbf" + MINIMAL.replace("\n", "\r\n").encode())
     assert config.load(path) == default()
 
 
-def test_files_that_cannot_be_read(tmp_path):
+def test_unreadable_file_is_refused(messages, tmp_path):
     binary = tmp_path / "binary.toml"
     binary.write_bytes(b"\x89HDF\xff\xfe")
-    for path, reason in [
-        (tmp_path / "none.toml", "file not found"),
-        (tmp_path, "a directory"),
-        (binary, "not a configuration file"),
-    ]:
-        with pytest.raises(FileError, match=reason) as caught:
+    for path in (tmp_path / "none.toml", tmp_path, binary):
+        with messages.raised(FileError) as caught:
             config.load(path)
         assert str(caught.value).startswith(f"{path}: ")
         assert caught.value.exit_code == 4
 
 
-def test_more_checkpoints_than_anyone_can_want():
+def test_too_many_checkpoints_is_refused(messages):
     text = '[problem]\nname = "shock_tube"\n[time]\nend = 0.2\n[output]\ninterval = {}\n'
-    with pytest.raises(ConfigError, match=r"line 6: output.interval = .*: expected at least 2e-06"):
+    with messages.raised(ConfigError, "line 6", "output.interval"):
         config.from_text(text.format("1.9e-6"))
     assert config.from_text(text.format("2.1e-6")).output.interval == 2.1e-6

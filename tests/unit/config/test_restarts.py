@@ -51,7 +51,7 @@ def test_every_key_has_a_class(name):
         assert restarts.class_of(section, key) in restarts.CLASSES, key
 
 
-def test_every_key_is_tried_below():
+def test_every_key_is_covered_by_these_tests():
     tried = {override.partition("=")[0] for override in FREE + RECORDED + REFUSED}
     keys = {f"{name}.{key}" for name, table in TABLES.items() for key in table.model_fields}
     assert len(PHYSICS) == 1  # so there is no other value to try of the key that names it
@@ -60,7 +60,7 @@ def test_every_key_is_tried_below():
 
 
 @pytest.mark.parametrize("override", FREE)
-def test_what_changes_no_result_is_free(override):
+def test_restart_key_without_effect_is_free(override):
     changed = changes([override])
     assert [one.key for one in changed] == [override.partition("=")[0]]
     assert restarts.refusals(changed) == []
@@ -68,7 +68,7 @@ def test_what_changes_no_result_is_free(override):
 
 
 @pytest.mark.parametrize("override", RECORDED)
-def test_what_changes_the_equations_goes_into_the_lineage(override):
+def test_restart_key_of_equations_is_recorded(override):
     changed = changes([override])
     assert restarts.refusals(changed) == []
     (one,) = changed
@@ -78,7 +78,7 @@ def test_what_changes_the_equations_goes_into_the_lineage(override):
 
 
 @pytest.mark.parametrize("override", REFUSED)
-def test_what_the_checkpoint_depends_on_is_refused(override):
+def test_restart_key_of_initial_state_is_refused(override):
     assert any(
         override.partition("=")[0] in line for line in restarts.refusals(changes([override]))
     )
@@ -92,11 +92,11 @@ def test_what_the_checkpoint_depends_on_is_refused(override):
         ([RANGE], "physics.alpha=1.0", True),
     ],
 )
-def test_a_kind_stays_and_its_parameters_may_change(start, override, refused):
+def test_restart_same_kind_accepts_new_parameters_only(start, override, refused):
     assert bool(restarts.refusals(changes([override], start))) == refused
 
 
-def test_the_lineage_tells_what_was_changed_and_when():
+def test_lineage_states_change_step_and_time():
     lines = (
         "restarted at step 3, t = 0.05",
         restarts.lineage(9, 0.125, changes(["physics.alpha=2.0", "time.end=0.3"])),
@@ -109,7 +109,7 @@ def test_the_lineage_tells_what_was_changed_and_when():
     assert second.endswith("(was not given) at t = 0.15")
 
 
-def test_a_change_is_told_with_what_is_now_and_what_was():
+def test_change_text_has_new_and_old_value():
     one = restarts.Change("physics.alpha", 1.0, 2.5, "recorded")
     assert str(one) == "physics.alpha = 2.5 (was 1.0)"
     assert str(one._replace(was=None)) == "physics.alpha = 2.5 (was not given)"
@@ -125,7 +125,7 @@ def test_a_change_is_told_with_what_is_now_and_what_was():
         (None, 1.5, "none"),
     ],
 )
-def test_a_kind_that_changes_is_refused_by_what_it_was(was, now, kind):
+def test_restart_other_kind_refused_naming_old_kind(was, now, kind):
     one = restarts.Change("physics.alpha", was, now, "same kind")
     (line,) = restarts.refusals([one])
     assert line.startswith("physics.alpha = ")
@@ -135,7 +135,7 @@ def test_a_kind_that_changes_is_refused_by_what_it_was(was, now, kind):
     assert restarts.refusals([one._replace(rule="recorded")]) == []
 
 
-def test_a_change_within_its_kind_goes_into_the_lineage_in_all_its_digits():
+def test_lineage_change_of_same_kind_has_all_digits():
     alike = restarts.Change("physics.heating", {"energy": 1.0}, {"energy": 2.0}, "same kind")
     free = restarts.Change("run.threads", 1, 2, "free")
     line = restarts.lineage(7, 0.1234567890123, [free, alike])

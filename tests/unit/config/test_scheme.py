@@ -29,21 +29,21 @@ def physics(scheme, gas):
 
 
 @pytest.mark.parametrize("folder", ["sph.kernels", "sph.eos", *model_folders()])
-def test_every_file_in_a_folder_of_models_is_a_model(folder):
+def test_file_in_folder_of_models_is_model(folder):
     for name in registry.names(folder):
         assert registry.model_class(folder, name).name == name
 
 
-def test_a_model_without_the_base_of_its_folder_is_an_error_that_says_so(tmp_path, monkeypatch):
+def test_model_without_base_of_folder_is_refused(messages, tmp_path, monkeypatch):
     (tmp_path / "plain.py").write_text(
         LIQUID.replace("@model(Defaults)", "").replace("Liquid", "P")
     )
     monkeypatch.setattr(eos, "__path__", [*eos.__path__, str(tmp_path)])
-    with pytest.raises(TypeError, match=r"sph\.eos\.plain: decorate POfATest with @model\(Base\)"):
+    with messages.raised(TypeError, "sph.eos.plain", "POfATest"):
         physics("grad_h", 'eos = { name = "plain", stiffness = 2.0 }')
 
 
-def test_pressure_energy_takes_an_ideal_gas_alone(tmp_path, monkeypatch):
+def test_pressure_energy_with_other_gas_is_refused(messages, tmp_path, monkeypatch):
     (tmp_path / "liquid.py").write_text(LIQUID)
     monkeypatch.setattr(eos, "__path__", [*eos.__path__, str(tmp_path)])
     liquid, gas = (
@@ -56,32 +56,32 @@ def test_pressure_energy_takes_an_ideal_gas_alone(tmp_path, monkeypatch):
     stiffened = 'eos = { name = "stiffened_gas", gamma = 4.4, p_inf = 1.0 }'
     assert physics("variational", stiffened).eos_model().p_inf == 1
     for other in (liquid, stiffened):
-        with pytest.raises(ConfigError, match=r'"pressure_energy": expected an .*, not \{ name'):
+        with messages.raised(ConfigError):
             physics("pressure_energy", other)
 
 
 @pytest.mark.parametrize(
     "problem", ["sound_wave", "gresho", "yee", "noh", "point_explosion", "expanding_ball"]
 )
-def test_problems_solved_for_an_ideal_gas_refuse_another(problem):
+def test_problem_for_ideal_gas_with_other_gas_is_refused(messages, problem):
     def read(p_inf):
         gas = f'{{ name = "stiffened_gas", gamma = 1.4, p_inf = {p_inf} }}'
         return config.from_text(f'[problem]\nname = "{problem}"\n[physics]\neos = {gas}\n', "a")
 
-    with pytest.raises(ConfigError, match=rf"line 4: physics.eos = .* an ideal gas for {problem}"):
+    with messages.raised(ConfigError, "line 4: physics.eos", problem):
         read(1.0)
     assert read(0.0).physics.eos_model().gamma == 1.4
 
 
 @pytest.mark.parametrize("gas", ["gamma = 7.0", 'eos = { name = "ideal_gas", gamma = 7.5 }'])
-def test_a_blast_that_would_be_hollow_is_refused_before_the_run(gas):
+def test_point_explosion_gamma_at_least_7_in_3d_is_refused(messages, gas):
     """Its solution ends at gamma = 7 in 3-D, and a run would end in that error."""
 
     def read(dimension, gas):
         head = f'[problem]\nname = "point_explosion"\ndimension = {dimension}\n[physics]\n'
         return config.from_text(head + gas, "a").physics
 
-    with pytest.raises(ConfigError, match=r"line 5: physics\..* expected gamma below 7 for point_"):
+    with messages.raised(ConfigError, "line 5"):
         read(3, gas)
     assert read(2, gas).eos_model().gamma >= 7.0
     assert read(3, "gamma = 6.9").gamma == 6.9
@@ -100,15 +100,14 @@ MASS = 'external = { name = "point_mass", mass = 1.0 }'
         ('"open"', False),
     ],
 )
-def test_a_point_mass_has_no_place_in_a_periodic_box(boundary, is_wrong):
+def test_point_mass_in_periodic_box_is_refused(messages, boundary, is_wrong):
     text = f'[problem]\nname = "uniform"\nboundary = {boundary}\n[physics]\n{MASS}\n'
     if not is_wrong:
         (field,) = (p.field for p in Scene(config.from_text(text)).parts if isinstance(p, External))
         assert field.mass == 1.0
         return
-    with pytest.raises(ConfigError, match=r"line 5: physics.external = .* no periodic images") as e:
+    with messages.raised(ConfigError, "line 5: physics.external", "Try: "):
         config.from_text(text, "a")
-    assert "Try: " in str(e.value)
 
 
 @pytest.mark.parametrize(
@@ -119,14 +118,13 @@ def test_a_point_mass_has_no_place_in_a_periodic_box(boundary, is_wrong):
         ('conductivity = "approach"', False),
     ],
 )
-def test_conductivity_that_acts_in_equilibrium_goes_with_no_external_field(conductivity, is_wrong):
+def test_conductivity_active_in_equilibrium_with_external_field_is_refused(
+    messages, conductivity, is_wrong
+):
     text = f'[problem]\nname = "uniform"\nboundary = "open"\n[physics]\n{conductivity}\n'
     assert config.from_text(text).physics.conductivity is not None
     if not is_wrong:
         assert config.from_text(text + MASS).physics.external is not None
         return
-    with pytest.raises(
-        ConfigError, match=r"line 5: physics.conductivity = .*physics.external"
-    ) as e:
+    with messages.raised(ConfigError, "line 5: physics.conductivity", "physics.external", "Try: "):
         config.from_text(text + MASS, "a")
-    assert 'Try: "approach"' in str(e.value)

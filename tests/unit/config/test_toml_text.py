@@ -27,7 +27,7 @@ j = 1.5
 """
 
 
-def test_every_key_has_the_line_where_it_begins():
+def test_key_lines_are_where_keys_begin():
     assert key_lines(TEXT) == {
         ("top",): 2,
         ("a",): 3,
@@ -53,11 +53,11 @@ def test_every_key_has_the_line_where_it_begins():
     }
 
 
-def test_the_text_of_this_test_is_toml():
+def test_sample_text_is_valid_toml():
     assert set(tomllib.loads(TEXT)) == {"top", "a", "many"}
 
 
-def test_lines_do_not_depend_on_the_line_ending():
+def test_key_lines_independent_of_line_ending():
     assert key_lines(TEXT.replace("\n", "\r\n")) == key_lines(TEXT)
 
 
@@ -76,7 +76,7 @@ def test_lines_do_not_depend_on_the_line_ending():
         {},
     ],
 )
-def test_a_value_reads_back_as_it_was(value):
+def test_value_text_reads_back_equal(value):
     text = value_text(value)
     assert "\n" not in text
     assert tomllib.loads(f"k = {text}")["k"] == value

@@ -30,7 +30,7 @@ def order(numbers, error):
     return -np.polyfit(np.log(numbers), np.log(error), 1)[0]
 
 
-def test_sod_converges_in_first_order():
+def test_sod_converges_at_first_order():
     numbers = [100, 200, 400, 800]
     by_n = np.array([errors(SOD, AIR, 0.2, n) for n in numbers])
     # a shock allows first order; 1.02 and 1.00 were measured, and 0.0014 for density at 800
@@ -39,7 +39,7 @@ def test_sod_converges_in_first_order():
     assert by_n[-1].max() < 0.003
 
 
-def test_liquid_is_solved_like_a_gas():
+def test_stiffened_gas_matches_exact_solution():
     water = StiffenedGas(4.4, 6e8)
     states = riemann.State(1000.0, 0.0, 1e9), riemann.State(1000.0, 0.0, 1e5)
     coarse, fine = (errors(states, water, 1.2e-4, n) for n in (100, 400))
@@ -48,7 +48,7 @@ def test_liquid_is_solved_like_a_gas():
     assert fine[1] < 0.4 * coarse[1] < 0.02
 
 
-def test_sound_between_walls_is_of_second_order():
+def test_sound_between_walls_converges_at_second_order():
     numbers, amplitude, time = [25, 50, 100], 1e-6, 1.1
     error = []
     for n in numbers:
@@ -63,7 +63,7 @@ def test_sound_between_walls_is_of_second_order():
     assert error[-1] < 1e-4
 
 
-def test_walls_keep_mass_and_energy():
+def test_walls_conserve_mass_and_energy():
     start = tube(riemann.State(1.0, 0.0, 1000.0), riemann.State(1.0, 0.0, 0.01), 200)
     end = evolve(start, AIR, 0.05, (True, True))  # the shock has been reflected
 
@@ -77,7 +77,7 @@ def test_walls_keep_mass_and_energy():
     assert end.pressure.min() > 0.0
 
 
-def test_contact_stays_as_sharp_as_it_began():
+def test_contact_at_rest_stays_sharp():
     start = tube(riemann.State(4.0, 3.0, 1.0), riemann.State(1.0, 3.0, 1.0), 50)
     end = evolve(start, AIR, 2.0, (False, False))
     # nothing moves within the gas: round-off
@@ -85,6 +85,6 @@ def test_contact_stays_as_sharp_as_it_began():
     np.testing.assert_allclose(end.faces, start.faces + 6.0, rtol=1e-12)
 
 
-def test_gas_without_pressure_is_refused():
+def test_zero_pressure_is_refused():
     with pytest.raises(ValueError, match="expected positive"):
         evolve(tube(SOD[0], riemann.State(1.0, 0.0, 0.0), 10), AIR, 0.1, (True, True))

@@ -26,7 +26,7 @@ def published(n):
 
 
 @pytest.mark.slow
-def test_tanh_layer():
+def test_growth_of_tanh_layer_matches_michalke():
     # Michalke (1964), J. Fluid Mech. 19, 543: the fastest growth of tanh(y), incompressible, is
     # 0.1897 at k = 0.4446. Here the Mach number is 0.01, which enters squared, and the two layers
     # are 20 apart.
@@ -37,13 +37,13 @@ def test_tanh_layer():
     assert kh.growth_rate(layer, 1.0) < 0.01  # k = 1 is neutral
 
 
-def test_compression_slows_growth():
+def test_growth_falls_with_mach_number():
     assert kh.growth_rate(two_layers(96, 40.0, 1.0, mach=0.5), 0.4446) < 0.15
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("densities", [(1.0, 2.0), (1.0, 10.0)])
-def test_thin_layers_are_vortex_sheets(densities):
+def test_growth_of_thin_layer_matches_vortex_sheet(densities):
     # the width enters at first order in k width, which two widths extrapolate away; what is left is
     # the square of the wider, 0.2^2, and the other layer half a period away, e^(-k/2) = 0.2 %
     k, period = 4.0 * np.pi, 1.0
@@ -56,12 +56,12 @@ def test_thin_layers_are_vortex_sheets(densities):
     assert 2.0 * thin - wide == pytest.approx(sheet, rel=0.042)
 
 
-def test_a_sheet_by_hand():
+def test_vortex_sheet_growth_matches_by_hand():
     assert kh.vortex_sheet(3.0, (0.5, -0.5), (1.0, 2.0)) == pytest.approx(2.0**0.5, rel=1e-15)
 
 
 @pytest.mark.slow
-def test_growth_of_the_published_layers_converges():
+def test_growth_of_published_layers_converges():
     # their slope has kinks, so the order is near 2: each doubling leaves a quarter of the change
     coarse, middle, fine = (kh.growth_rate(published(n), WAVENUMBER) for n in (32, 64, 128))
     assert abs(fine - middle) < 0.4 * abs(middle - coarse)
@@ -69,7 +69,7 @@ def test_growth_of_the_published_layers_converges():
 
 
 @pytest.mark.slow
-def test_evolution_ends_in_the_fastest_mode():
+def test_evolution_approaches_fastest_mode():
     layer = published(64)
     start = np.zeros((3, 64), dtype=complex)
     start[1] = 1.0
@@ -80,7 +80,7 @@ def test_evolution_ends_in_the_fastest_mode():
     assert rate == pytest.approx(kh.growth_rate(layer, WAVENUMBER), rel=0.005)
 
 
-def test_sound_in_gas_at_rest_keeps_its_frequency():
+def test_evolution_of_sound_at_rest_has_exact_frequency():
     # u, p of a wave along x in uniform gas: e^(-ikct), to the tolerance of the steps
     layer = kh.ShearLayer(1.0, np.zeros(8), np.full(8, 2.0), np.full(8, 2.0 * 9.0))
     start = np.zeros((3, 8), dtype=complex)
@@ -91,7 +91,7 @@ def test_sound_in_gas_at_rest_keeps_its_frequency():
     assert kh.growth_rate(layer, WAVENUMBER) == pytest.approx(0.0, abs=1e-10)  # round-off
 
 
-def test_at_the_start_it_is_the_start():
+def test_evolution_at_start_equals_initial_state():
     start = np.ones((3, 8), dtype=complex)
     found = kh.evolution(two_layers(8, 1.0, 0.1), 1.0, start, np.array([0.0]))
     np.testing.assert_array_equal(found, start[None])
@@ -101,7 +101,7 @@ def test_at_the_start_it_is_the_start():
 
 
 @pytest.mark.slow
-def test_the_published_problem_measures_theory_as_theory():
+def test_problem_theory_growth_matches_linear_theory():
     from sph.config import from_text
 
     config = from_text('[problem]\nname = "kelvin_helmholtz_smooth"\nn = 1024\n')

@@ -22,7 +22,7 @@ def in_shells(low, high, dimension, quantity):
 
 
 @pytest.mark.parametrize(("dimension", "density"), [(1, 4.0), (2, 16.0), (3, 64.0)])
-def test_published_plateaus(dimension, density):
+def test_plateaus_match_published(dimension, density):
     # powers of (8/3)/(2/3), which round in the last digits
     assert noh.plateau(5 / 3, dimension) == pytest.approx((density, density / 3), rel=1e-14)
     inside = noh.solve([0.0, 0.19], 0.6, 5 / 3, dimension)
@@ -31,7 +31,7 @@ def test_published_plateaus(dimension, density):
     assert noh.shock_radius(0.6, 1.0, 5 / 3) == pytest.approx(0.2, rel=1e-15)
 
 
-def test_gas_in_front_is_compressed_by_the_geometry():
+def test_gas_ahead_of_shock_is_compressed_by_geometry():
     # (1 + t/r)^(D - 1) at t = 0.6 and r = 0.3, by hand
     for dimension, density in ((1, 1.0), (2, 3.0), (3, 9.0)):
         in_front = noh.solve([0.3], 0.6, 5 / 3, dimension, background_pressure=1e-6)
@@ -41,7 +41,7 @@ def test_gas_in_front_is_compressed_by_the_geometry():
 
 
 @every_case
-def test_strong_shock_jump(gamma, dimension):
+def test_shock_jump_is_strong_shock_limit(gamma, dimension):
     density, speed, time = 1.7, 2.5, 0.3
     shock_speed = noh.shock_radius(1.0, speed, gamma)
     radius = noh.shock_radius(time, speed, gamma)
@@ -59,7 +59,7 @@ def test_strong_shock_jump(gamma, dimension):
 
 
 @every_case
-def test_mass_and_energy_of_what_fell_in(gamma, dimension):
+def test_mass_and_energy_inside_equal_inflow(gamma, dimension):
     density, speed, time, edge = 1.7, 2.5, 0.3, 1.1
     shock = noh.shock_radius(time, speed, gamma)
 
@@ -76,7 +76,7 @@ def test_mass_and_energy_of_what_fell_in(gamma, dimension):
 
 
 @pytest.mark.parametrize("dimension", [1, 2, 3])
-def test_before_the_start_all_is_uniform(dimension):
+def test_state_before_start_is_uniform(dimension):
     density, speed, pressure = noh.solve([0.0, 0.5], 0.0, 5 / 3, dimension, 2.0, 3.0, 1e-6)
     assert density.tolist() == [2.0, 2.0]
     assert speed.tolist() == [-3.0, -3.0]
@@ -96,7 +96,7 @@ def test_before_the_start_all_is_uniform(dimension):
         ({"time": math.nan}, "radius and time"),
     ],
 )
-def test_nonsense_is_refused(change, message):
+def test_invalid_arguments_are_refused(change, message):
     arguments = {"radius": [0.1], "time": 1.0, "gamma": 1.4, "dimension": 3}
     with pytest.raises(ValueError, match=message):
         noh.solve(**(arguments | change))

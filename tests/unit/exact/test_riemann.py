@@ -50,20 +50,20 @@ every_problem = pytest.mark.parametrize("problem", PROBLEMS.values(), ids=PROBLE
         ((1.0, 0.0, 1.0), (0.25, 0.0, 0.1795), 0.429346, 0.673103, (1e-6, 1e-6)),
     ],
 )
-def test_published_star_state(left, right, pressure, velocity, digit):
+def test_star_state_matches_published(left, right, pressure, velocity, digit):
     star = star_state(State(*left), State(*right), AIR)
     assert star.pressure == pytest.approx(pressure, abs=0.5 * digit[0], rel=0)
     assert star.velocity == pytest.approx(velocity, abs=0.5 * digit[1], rel=0)
 
 
-def test_collision_of_rounded_states():
+def test_collision_of_nearly_equal_states_is_solved():
     # Toro's test 5 prints its initial states to 6 digits; its star state is known to as many.
     star = star_state(*PROBLEMS["two_shocks"])
     assert star.pressure == pytest.approx(1691.64, rel=1e-5)
     assert star.velocity == pytest.approx(8.68975, rel=1e-5)
 
 
-def test_seed_plateaus():
+def test_star_states_match_shipped_tubes():
     # Densities and shock speeds quoted to six decimals (the shock speed of the second to five).
     tube = (State(1.0, 0.0, 1.0), State(0.25, 0.0, 0.1795), AIR)
     star, speed = star_state(*tube), wave_speeds(*tube)
@@ -74,7 +74,7 @@ def test_seed_plateaus():
     assert speed.right_head == pytest.approx(23.51754, abs=5e-6)
 
 
-def test_cold_collision_in_closed_form():
+def test_cold_collision_matches_closed_form():
     # Equal cold streams at speed w: both shocks move at (gamma - 1) w / 2, density (g + 1)/(g - 1).
     star = star_state(State(1.0, 3.0, 0.0), State(1.0, -3.0, 0.0), gas(5 / 3))
     speed = wave_speeds(State(1.0, 3.0, 0.0), State(1.0, -3.0, 0.0), gas(5 / 3))
@@ -94,7 +94,7 @@ def flux(density, velocity, pressure, eos):
 
 
 @every_problem
-def test_integral_conservation(problem):
+def test_profile_conserves_mass_momentum_and_energy(problem):
     """Mass, momentum and energy between two rays x = a t and x = b t: all parts of the solution."""
     left, right, eos = problem
     speed = wave_speeds(*problem)
@@ -114,7 +114,7 @@ def test_integral_conservation(problem):
 
 
 @every_problem
-def test_shocks_obey_rankine_hugoniot(problem):
+def test_shocks_satisfy_rankine_hugoniot(problem):
     left, right, eos = problem
     star, speed = star_state(*problem), wave_speeds(*problem)
     behind_left = (star.density_left, star.velocity, star.pressure)
@@ -132,7 +132,7 @@ def test_shocks_obey_rankine_hugoniot(problem):
 
 
 @every_problem
-def test_fans_keep_entropy_and_the_riemann_invariant(problem):
+def test_fans_conserve_entropy_and_riemann_invariant(problem):
     left, right, eos = problem
     speed = wave_speeds(*problem)
     for state, head, tail, sign in (
@@ -162,7 +162,7 @@ def sample(problem):
 
 
 @every_problem
-def test_mirror(problem):
+def test_mirrored_states_give_mirrored_solution(problem):
     left, right, eos = problem
     xi = sample(problem)
     flipped = [State(s.density, -s.velocity, s.pressure) for s in (right, left)]
@@ -175,7 +175,7 @@ def test_mirror(problem):
 
 
 @pytest.mark.parametrize("name", ["sod", "two_fans", "two_shocks", "vacuum_opens", "vacuum_left"])
-def test_galilean_invariance(name):
+def test_solution_is_galilean_invariant(name):
     left, right, eos = PROBLEMS[name]
     xi = sample(PROBLEMS[name])
     boost = 4.0
@@ -189,7 +189,7 @@ def test_galilean_invariance(name):
 
 
 @pytest.mark.parametrize("name", ["two_fans", "vacuum_opens", "vacuum_left", "vacuum_right"])
-def test_without_shock_and_contact_all_is_continuous(name):
+def test_solution_without_shock_and_contact_is_continuous(name):
     problem = PROBLEMS[name]
     speed = wave_speeds(*problem)
     step = 1e-9
@@ -199,7 +199,7 @@ def test_without_shock_and_contact_all_is_continuous(name):
         assert np.allclose(below, above, atol=10 * step, rtol=0)
 
 
-def test_vacuum_lies_between_its_edges():
+def test_vacuum_between_its_edges_only():
     left, right, eos = PROBLEMS["vacuum_opens"]
     star, speed = star_state(left, right, eos), wave_speeds(left, right, eos)
     assert star.vacuum
@@ -213,7 +213,7 @@ def test_vacuum_lies_between_its_edges():
     assert np.array_equal(velocity, xi)
 
 
-def test_star_state_is_continuous_where_vacuum_begins():
+def test_star_state_near_vacuum_is_continuous():
     # Parting a millionth slower than the escape speeds must leave next to nothing.
     escape = 2 * 5.0 * math.sqrt(1.4)
     for slower, vacuum in ((1e-6, False), (-1e-6, True)):
@@ -224,7 +224,7 @@ def test_star_state_is_continuous_where_vacuum_begins():
         assert star.pressure <= 1.001e-42
 
 
-def test_equal_states_stay():
+def test_equal_states_stay_uniform():
     state = State(0.7, 0.2, 3.0)
     profile = solve(state, state, AIR, np.linspace(-5.0, 5.0, 21))
     for found, expected in zip(profile, state, strict=True):
@@ -232,7 +232,7 @@ def test_equal_states_stay():
         assert np.allclose(found, expected, rtol=1e-14, atol=0)
 
 
-def test_cold_gases_at_rest_stay():
+def test_cold_gases_at_rest_stay_at_rest():
     left, right = State(1.0, 0.5, 0.0), State(2.0, 0.5, 0.0)
     assert star_state(left, right, AIR) == (0.0, 0.5, 1.0, 2.0, False)
     density, velocity, pressure = solve(left, right, AIR, [0.0, 1.0])
@@ -241,7 +241,7 @@ def test_cold_gases_at_rest_stay():
     assert pressure.tolist() == [0.0, 0.0]
 
 
-def test_infinite_rays_see_the_initial_states():
+def test_infinite_rays_give_initial_states():
     left, right, eos = SOD
     profile = np.array(solve(left, right, eos, [-np.inf, np.inf]))
     assert profile[:, 0].tolist() == list(left)
@@ -261,12 +261,12 @@ def test_infinite_rays_see_the_initial_states():
         ((1.0, -200.0, 1.0), (1.0, 200.0, 1.0), 1.01, "too low for float64"),
     ],
 )
-def test_nonsense_is_refused(left, right, gamma, message):
+def test_invalid_states_are_refused(left, right, gamma, message):
     with pytest.raises(ValueError, match=message):
         star_state(State(*left), State(*right), gas(gamma))
 
 
-def test_shock_into_water_by_hand():
+def test_shock_into_water_matches_by_hand():
     """The jump written out for a piston: shock speed from Rankine-Hugoniot in P + p_inf."""
     water = gas(4.4, 6e8)
     left, right = State(1000.0, 0.0, 1e9), State(1000.0, 0.0, 1e5)
@@ -294,7 +294,7 @@ def test_shock_into_water_by_hand():
     assert star.velocity == pytest.approx(2.0 * (c[0] - c[1]) / 3.4, rel=1e-12)
 
 
-def test_stiffened_gas_without_offset_is_an_ideal_one():
+def test_stiffened_gas_zero_p_inf_equals_ideal_gas():
     for ideal in (SOD, PROBLEMS["two_fans"], PROBLEMS["vacuum_opens"]):
         xi = sample(ideal)
         stiffened = (*ideal[:2], StiffenedGas(ideal[2].gamma, 0.0))
@@ -302,6 +302,6 @@ def test_stiffened_gas_without_offset_is_an_ideal_one():
             np.testing.assert_array_equal(a, b)
 
 
-def test_tension_beyond_the_offset_is_refused():
+def test_tension_beyond_p_inf_is_refused():
     with pytest.raises(ValueError, match="P \\+ p_inf of the right state must not be negative"):
         star_state(State(1000.0, 0.0, 1e5), State(1000.0, 0.0, -7e8), gas(4.4, 6e8))

@@ -32,13 +32,13 @@ def integral(gamma, dimension, quantity):
 
 
 @pytest.mark.parametrize(("gamma", "xi"), [(5 / 3, 1.152), (1.4, 1.033)])
-def test_published_shock_radius_in_3d(gamma, xi):
+def test_shock_radius_3d_matches_published(gamma, xi):
     # half a unit of the last digit quoted
     assert sedov.shock_radius(1.0, 1.0, gamma, 3, 1.0) == pytest.approx(xi, abs=5e-4)
 
 
 @every_case
-def test_shock_radius_scales(gamma, dimension):
+def test_shock_radius_follows_similarity_scaling(gamma, dimension):
     one = sedov.shock_radius(1.0, 1.0, gamma, dimension, 1.0)
     expected = one * (ENERGY * TIME**2 / DENSITY) ** (1.0 / (dimension + 2))
     assert radius_of_shock(gamma, dimension) == pytest.approx(expected, rel=1e-14)  # round-off
@@ -47,19 +47,19 @@ def test_shock_radius_scales(gamma, dimension):
 # Tolerance of the three integrals: the profile begins as a power r^(D/(gamma - 1)), not an integer,
 # where 200 Gauss nodes err by less than 1e-9; the solution itself is exact to 1e-14.
 @every_case
-def test_energy_of_the_profile(gamma, dimension):
+def test_profile_energy_equals_released_energy(gamma, dimension):
     energy = integral(gamma, dimension, lambda r, rho, v, p: 0.5 * rho * v**2 + p / (gamma - 1.0))
     assert energy == pytest.approx(ENERGY, rel=1e-9)
 
 
 @every_case
-def test_mass_of_the_profile(gamma, dimension):
+def test_profile_mass_equals_swept_mass(gamma, dimension):
     swept = DENSITY * SPHERE[dimension] / dimension * radius_of_shock(gamma, dimension) ** dimension
     assert integral(gamma, dimension, lambda r, rho, v, p: rho) == pytest.approx(swept, rel=1e-9)
 
 
 @every_case
-def test_momentum_weighted_radius(gamma, dimension):
+def test_momentum_weighted_radius_matches_integral(gamma, dimension):
     moment = integral(gamma, dimension, lambda r, rho, v, p: rho * v * r)
     momentum = integral(gamma, dimension, lambda r, rho, v, p: rho * v)
     found = sedov.momentum_weighted_radius(ENERGY, DENSITY, gamma, dimension, TIME)
@@ -68,7 +68,7 @@ def test_momentum_weighted_radius(gamma, dimension):
 
 
 @every_case
-def test_strong_shock_jump(gamma, dimension):
+def test_shock_jump_is_strong_shock_limit(gamma, dimension):
     shock = radius_of_shock(gamma, dimension)
     # The shock's speed from its path by central difference: error and round-off 1e-10 of it
     step = 1e-5 * TIME
@@ -83,7 +83,7 @@ def test_strong_shock_jump(gamma, dimension):
 
 
 @every_case
-def test_interior_solves_the_equations(gamma, dimension):
+def test_interior_satisfies_euler_equations(gamma, dimension):
     """Continuity, momentum and entropy by central differences of the solution in r and t."""
     shock = radius_of_shock(gamma, dimension)
     r = np.linspace(0.3, 0.95, 14) * shock
@@ -110,7 +110,7 @@ def test_interior_solves_the_equations(gamma, dimension):
 
 
 @every_case
-def test_centre_is_finite(gamma, dimension):
+def test_profile_at_centre_is_finite(gamma, dimension):
     with np.errstate(divide="raise", invalid="raise"):
         density, velocity, pressure = blast([0.0, 1e-300, 1e-12, 1e-3], gamma, dimension)
     assert np.all(np.isfinite([density, velocity, pressure]))
@@ -123,13 +123,13 @@ def test_centre_is_finite(gamma, dimension):
     assert pressure[3] == pytest.approx(pressure[0], rel=1e-7)
 
 
-def test_outside_is_background():
+def test_profile_outside_shock_is_background():
     radius = np.array([1.0 + 1e-12, 2.0]) * radius_of_shock(1.4, 2)
     profile = sedov.solve(radius, TIME, ENERGY, DENSITY, 1.4, 2, background_pressure=1e-6)
     assert [field.tolist() for field in profile] == [[DENSITY] * 2, [0.0] * 2, [1e-6] * 2]
 
 
-def test_gamma_2_is_no_exception():
+def test_profile_gamma_2_is_regular():
     # The usual closed form divides by gamma - 2. A gamma 1e-9 away must give the same within 1e-8.
     radius = np.linspace(0.0, 0.9, 10) * radius_of_shock(2.0, 3)
     for beside in (2.0 - 1e-9, 2.0 + 1e-9):
@@ -150,7 +150,7 @@ def test_gamma_2_is_no_exception():
         ({"radius": [-0.1]}, "radius"),
     ],
 )
-def test_nonsense_is_refused(change, message):
+def test_invalid_arguments_are_refused(change, message):
     arguments = {
         "radius": [0.1],
         "time": 1.0,

@@ -83,7 +83,7 @@ def assert_goes_on_as(past, uninterrupted):
 
 
 @pytest.mark.slow
-def test_a_checkpoint_of_format_1_goes_on_with_the_budget_of_the_history(parting, tmp_path):
+def test_restart_of_format_1_takes_budget_from_history(parting, tmp_path):
     run = RunDirectory(shutil.copytree(parting.path, tmp_path / "run"))
     source = run.checkpoint_path(2)
     whole = checkpoint.read(source)
@@ -100,7 +100,7 @@ def test_a_checkpoint_of_format_1_goes_on_with_the_budget_of_the_history(parting
 
 
 @pytest.mark.slow
-def test_a_lone_checkpoint_goes_on_with_the_budget_that_it_holds(parting, tmp_path):
+def test_restart_without_run_takes_budget_from_checkpoint(parting, tmp_path):
     lone = tmp_path / "lone.h5"
     shutil.copy(parting.checkpoint_path(2), lone)
     _, run = restarting.restart(lone, [], tmp_path / "elsewhere", Lines())
@@ -112,7 +112,7 @@ def test_a_lone_checkpoint_goes_on_with_the_budget_that_it_holds(parting, tmp_pa
 
 
 @pytest.mark.slow
-def test_a_lone_checkpoint_of_format_1_begins_the_budget_anew(parting, tmp_path):
+def test_restart_of_format_1_without_run_starts_new_budget(parting, tmp_path):
     lone = tmp_path / "lone.h5"
     shutil.copy(parting.checkpoint_path(2), lone)
     as_format_1(lone)

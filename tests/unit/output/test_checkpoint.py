@@ -28,18 +28,21 @@ def written(tmp_path, make_state):
     return path
 
 
-def refused(path, *words):
-    """The message of the FileError that reading `path` ends in: one sentence and what to try."""
-    with pytest.raises(FileError) as caught:
-        checkpoint.read(path)
-    message = str(caught.value)
-    assert caught.value.exit_code == 4
-    assert str(path) in message
-    assert len(message.splitlines()) == 2
-    assert message.splitlines()[1].startswith("Try: ")
-    for word in words:
-        assert word in message
-    return message
+HDF5_SAYS = r"Unable to .*(?=\)\.)"  # differs between versions of HDF5
+
+
+@pytest.fixture
+def refused(messages):
+    """refused(path): reading `path` is an error of one sentence and what to try."""
+
+    def check(path, mask=None):
+        with messages.raised(FileError, path, mask=mask) as caught:
+            checkpoint.read(path)
+        assert caught.value.exit_code == 4
+        assert len(str(caught.value).splitlines()) == 2
+        assert "\nTry: " in str(caught.value)
+
+    return check
 
 
 def seal(path):
@@ -61,7 +64,7 @@ def damage(path, offset):
 
 @pytest.mark.parametrize("dimension", [1, 2, 3])
 @pytest.mark.parametrize("alpha", [None, 0.1])
-def test_round_trip_is_bit_for_bit(tmp_path, make_state, dimension, alpha):
+def test_write_and_read_is_bit_for_bit(tmp_path, make_state, dimension, alpha):
     state = make_state(dimension, alpha=alpha)
     state.particles.velocity[0, :3] = -0.0, 1e300, 5e-324
     path = tmp_path / "a.h5"
@@ -87,14 +90,14 @@ def test_round_trip_is_bit_for_bit(tmp_path, make_state, dimension, alpha):
     assert back.budget == state.budget
 
 
-def test_pressure_is_that_of_the_state(make_state):
+def test_public_pressure_matches_state(make_state):
     state = make_state()
     rho, u = state.particles.density, state.particles.internal_energy
     # one rounding a factor, three factors
     np.testing.assert_allclose(state.pressure, (1.4 - 1) * rho * u, rtol=1e-15)
 
 
-def test_equal_states_make_equal_files(tmp_path, make_state):
+def test_equal_states_give_equal_files(tmp_path, make_state):
     checkpoint.write(tmp_path / "a.h5", make_state(alpha=0.1))
     checkpoint.write(tmp_path / "b.h5", make_state(alpha=0.1))
     checkpoint.write(tmp_path / "c.h5", make_state(alpha=0.1, seed=2))
@@ -103,7 +106,7 @@ def test_equal_states_make_equal_files(tmp_path, make_state):
     assert content["a"] != content["c"]
 
 
-def test_private_datasets_are_the_numerical_state(written, make_state):
+def test_private_datasets_equal_numerical_state(written, make_state):
     state = make_state()
     with h5py.File(written) as file:
         group = file["Checkpoint"]
@@ -117,7 +120,7 @@ def test_private_datasets_are_the_numerical_state(written, make_state):
         assert "[physics]" in group.attrs["configuration"]
 
 
-def test_hash_sees_values_names_types_and_shapes():
+def test_state_hash_depends_on_values_names_types_and_shapes():
     state = {"a": np.arange(4.0), "b": np.array(1.0)}
     others = [
         {"a": np.arange(4.0) + 1e-15, "b": np.array(1.0)},
@@ -131,59 +134,59 @@ def test_hash_sees_values_names_types_and_shapes():
     assert checkpoint.state_hash(dict(reversed(state.items()))) == checkpoint.state_hash(state)
 
 
-def test_missing_file(tmp_path):
-    refused(tmp_path / "no.h5", "checkpoint not found")
+def test_read_missing_file_is_refused(refused, tmp_path):
+    refused(tmp_path / "no.h5")
 
 
-def test_directory(tmp_path):
-    refused(tmp_path, "cannot read", "directory")
+def test_read_directory_is_refused(refused, tmp_path):
+    refused(tmp_path)
 
 
-def test_not_hdf5(tmp_path):
+def test_read_file_not_hdf5_is_refused(refused, tmp_path):
     path = tmp_path / "a.h5"
     for content in (b"", b"[problem]\n"):
         path.write_bytes(content)
-        refused(path, "not an HDF5 file")
+        refused(path)
 
 
-def test_hdf5_of_another_program(tmp_path):
+def test_read_hdf5_of_other_program_is_refused(refused, tmp_path):
     path = tmp_path / "a.h5"
     h5py.File(path, "w").close()
-    refused(path, "not a checkpoint of sph")
+    refused(path)
 
 
 @pytest.mark.parametrize("share", [0.0005, 0.1, 0.9, 0.99])
-def test_truncated(written, share):
+def test_read_truncated_file_is_refused(refused, written, share):
     content = written.read_bytes()
     written.write_bytes(content[: int(share * len(content))])
-    refused(written, "truncated or damaged")
+    refused(written, mask=HDF5_SAYS)
     with pytest.raises(files.Damaged):
         checkpoint.read(written)
 
 
-def test_one_flipped_bit_in_an_array(written):
+def test_read_flipped_bit_in_array_is_refused(refused, written):
     with h5py.File(written) as file:
         offset = file["Checkpoint/velocity"].id.get_offset()
     damage(written, offset + 100)
-    refused(written, "damaged")
+    refused(written)
 
 
-def test_one_flipped_bit_in_a_number(written):
+def test_read_flipped_bit_in_number_is_refused(refused, written):
     with h5py.File(written) as file:
         offset = file["Checkpoint/time"].id.get_offset()
     damage(written, offset)
-    refused(written, "its content does not match the SHA-256 at its end")
+    refused(written)
     unseal(written)
-    refused(written, "the state does not match its SHA-256")
+    refused(written)
 
 
-def test_one_flipped_bit_in_the_configuration(written):
+def test_read_flipped_bit_in_configuration_is_refused(refused, written):
     damage(written, written.read_bytes().index(b"eta = 1.5"))
     unseal(written)
-    refused(written, "the configuration does not match its SHA-256")
+    refused(written)
 
 
-def test_a_flipped_bit_anywhere_is_found_before_hdf5_looks(written, monkeypatch):
+def test_read_flipped_bit_anywhere_found_by_checksum(written, monkeypatch):
     whole = written.read_bytes()
     monkeypatch.setattr(stored, "load", None)  # not callable
     monkeypatch.setattr(stored, "check_apart", None)
@@ -191,15 +194,16 @@ def test_a_flipped_bit_anywhere_is_found_before_hdf5_looks(written, monkeypatch)
     for offset in np.random.default_rng(3).integers(len(stored.SIGNATURE), end, size=50):
         written.write_bytes(whole)
         damage(written, offset)
-        refused(written, "its content does not match the SHA-256 at its end")
+        with pytest.raises(files.Damaged):
+            checkpoint.read(written)
 
 
-def test_a_file_of_an_older_version_has_no_seal_and_is_read(written, make_state):
+def test_read_older_file_without_checksum_succeeds(written, make_state):
     unseal(written)
     assert checkpoint.read(written).time == make_state().time
 
 
-def test_zeroed_sectors_without_a_seal_are_harmless_or_refused(written, make_state):
+def test_read_zeroed_sector_without_checksum_harmless_or_refused(written, make_state):
     """HDF5 hangs on some: the global heap of the texts, which is found by its signature, is one."""
     unseal(written)
     whole = written.read_bytes()
@@ -212,15 +216,16 @@ def test_zeroed_sectors_without_a_seal_are_harmless_or_refused(written, make_sta
 
 
 @pytest.mark.parametrize(
-    ("program", "limits", "words"),
+    ("program", "limits"),
     [
-        ("while True: pass", {"SECONDS": 0.5, "PATIENCE": 100}, "HDF5 fails to read it"),
-        ("bytearray(1 << 30)", {"MEMORY": 100 << 20}, "HDF5 fails to read it"),
-        ("os.kill(os.getpid(), 11)", {}, "HDF5 fails to read it"),
-        ("__import__('time').sleep(60)", {"SECONDS": 0.2}, "HDF5 did not finish"),
+        ("while True: pass", {"SECONDS": 0.5, "PATIENCE": 100}),
+        ("bytearray(1 << 30)", {"MEMORY": 100 << 20}),
+        ("os.kill(os.getpid(), 11)", {}),
+        ("__import__('time').sleep(60)", {"SECONDS": 0.2}),
     ],
+    ids=["CPU time", "memory", "crash", "wall-clock time"],
 )
-def test_the_process_that_looks_at_a_file_is_limited(written, monkeypatch, program, limits, words):
+def test_inspecting_process_has_limits(refused, written, monkeypatch, program, limits):
     """What HDF5 does on some damaged files, done by a stand-in for it."""
     unseal(written)
     source = Path(stored.__file__).read_text()
@@ -234,10 +239,10 @@ def test_the_process_that_looks_at_a_file_is_limited(written, monkeypatch, progr
     path = written.parent / "stand_in.py"
     path.write_text(stand_in)
     monkeypatch.setattr(stored, "__file__", str(path))
-    refused(written, words)
+    refused(written)
 
 
-def test_a_lock_of_another_program_does_not_matter(written, make_state):
+def test_read_locked_file_succeeds(written, make_state):
     with written.open("r+b") as other:
         fcntl.flock(other, fcntl.LOCK_EX)
         assert checkpoint.read(written).time == make_state().time
@@ -245,12 +250,12 @@ def test_a_lock_of_another_program_does_not_matter(written, make_state):
         assert checkpoint.read(written).time == make_state().time
 
 
-def test_what_cannot_be_read_is_not_called_damaged(written, monkeypatch):
+def test_read_unreadable_file_not_called_damaged(messages, written, monkeypatch):
     def fail(*_):
         raise OSError(errno.EIO, "Input/output error")
 
     monkeypatch.setattr(checkpoint, "is_sealed", fail)
-    with pytest.raises(FileError, match=r"cannot read .*: Input/output error") as caught:
+    with messages.raised(FileError) as caught:
         checkpoint.read(written)
     assert not isinstance(caught.value, files.Damaged)
 
@@ -299,69 +304,66 @@ def listed(group, name, entry):
 
 
 STRANGE = {
-    "longer": (replaced("mass", data=np.ones(51)), "mass has the shape (51,), expected (50,)"),
-    "half": (replaced("omega", data=np.ones(25)), "omega has the shape (25,)"),
-    "complex": (replaced("mass", data=np.ones(50, complex)), "mass is of type <c16"),
-    "big-endian": (replaced("mass", data=np.ones(50, ">f8")), "mass is of type >f8"),
-    "text": (replaced("mass", data=[b"a"] * 50), "mass is of type"),
-    "scalar": (replaced("mass", data=1.0), "mass has the shape ()"),
-    "null": (replaced("mass", data=h5py.Empty("f8")), "mass has the shape None"),
-    "time": (replaced("time", data=np.nan), "time = nan"),
-    "step": (replaced("step", data=1e300), "step is of type <f8"),
-    "steps": (replaced("step", data=2**63 - 1), "step = 9223372036854775807"),
-    "negative": (replaced("step", data=-1), "step = -1"),
-    "no step": (replaced("next_step", data=0.0), "next_step = 0.0"),
-    "skin": (replaced("list_skin", data=1e9), "list_skin = 1000000000.0"),
-    "injected": (replaced("energy_injected", data=np.nan), "energy_injected = nan"),
-    "baseline": (replaced("baseline_scale", data=np.inf), "baseline_scale = inf"),
-    "IDs": (replaced("id", data=np.ones(50, int)), "IDs are not all positive"),
-    "nan": (replaced("velocity", data=np.full((2, 50), np.nan)), "velocity is not finite"),
-    "support": (replaced("support", data=np.zeros(50)), "support is not above 0"),
-    "cold": (replaced("internal_energy", data=-np.ones(50)), "internal_energy is below 0"),
-    "away": (replaced("list_position", data=np.full((2, 50), 9.0)), "list_position is outside"),
-    "far": (replaced("position", data=np.full((2, 50), 1e200)), "position is outside the domain"),
-    "3-D": (replaced("position", data=np.zeros((3, 50))), "position has the shape (3, 50)"),
-    "empty": (replaced("mass", data=None, shape=(10**9,), dtype=float, chunks=(1000,)),
-              "mass is not stored in full"),
-    "bomb": (replaced("mass", data=np.ones(10**6), compression="gzip"), "compressed"),
-    "chunks": (
-        replaced("mass", data=None, shape=(50,), dtype=float, chunks=(10**8,), maxshape=(None,)),
-        "chunks larger than the file",
+    "longer": replaced("mass", data=np.ones(51)),
+    "half": replaced("omega", data=np.ones(25)),
+    "complex": replaced("mass", data=np.ones(50, complex)),
+    "big-endian": replaced("mass", data=np.ones(50, ">f8")),
+    "text": replaced("mass", data=[b"a"] * 50),
+    "scalar": replaced("mass", data=1.0),
+    "null": replaced("mass", data=h5py.Empty("f8")),
+    "time": replaced("time", data=np.nan),
+    "step": replaced("step", data=1e300),
+    "steps": replaced("step", data=2**63 - 1),
+    "negative": replaced("step", data=-1),
+    "no step": replaced("next_step", data=0.0),
+    "skin": replaced("list_skin", data=1e9),
+    "injected": replaced("energy_injected", data=np.nan),
+    "baseline": replaced("baseline_scale", data=np.inf),
+    "IDs": replaced("id", data=np.ones(50, int)),
+    "nan": replaced("velocity", data=np.full((2, 50), np.nan)),
+    "support": replaced("support", data=np.zeros(50)),
+    "cold": replaced("internal_energy", data=-np.ones(50)),
+    "away": replaced("list_position", data=np.full((2, 50), 9.0)),
+    "far": replaced("position", data=np.full((2, 50), 1e200)),
+    "3-D": replaced("position", data=np.zeros((3, 50))),
+    "empty": replaced("mass", data=None, shape=(10**9,), dtype=float, chunks=(1000,)),
+    "bomb": replaced("mass", data=np.ones(10**6), compression="gzip"),
+    "chunks": replaced(
+        "mass", data=None, shape=(50,), dtype=float, chunks=(10**8,), maxshape=(None,)
     ),
-    "outside": (in_a_raw_file, "stored in another file"),
-    "virtual": (virtual, "stored in another file"),
-    "link": (linked(h5py.ExternalLink("pipe", "/mass")), "mass is a link"),
-    "soft": (linked(h5py.SoftLink("/PartType0/Masses")), "mass is a link"),
-    "more": (lambda group: group.create_dataset("more", data=1.0), "not hold the datasets"),
-    "less": (lambda group: group.pop("mass"), "mass missing"),
-    "unlisted": (lambda group: (group.pop("mass"), listed(group, "mass", None)),
-                 "mass is missing, which contradicts"),
-    "alpha": (lambda group: (group.create_dataset("alpha", data=np.ones(50)),
-                             listed(group, "alpha", [0, False])), "alpha is present"),
-    "format": (lambda group: group.attrs.update(format_version=[1, 2]), "format_version"),
-    "lineage": (lambda group: group.attrs.update(lineage="{}"), "lineage"),
-    "text array": (lambda group: group.attrs.update(configuration=["a"] * 9), "configuration"),
+    "outside": in_a_raw_file,
+    "virtual": virtual,
+    "link": linked(h5py.ExternalLink("pipe", "/mass")),
+    "soft": linked(h5py.SoftLink("/PartType0/Masses")),
+    "more": lambda group: group.create_dataset("more", data=1.0),
+    "less": lambda group: group.pop("mass"),
+    "unlisted": lambda group: (group.pop("mass"), listed(group, "mass", None)),
+    "alpha": lambda group: (
+        group.create_dataset("alpha", data=np.ones(50)), listed(group, "alpha", [0, False]),
+    ),
+    "format": lambda group: group.attrs.update(format_version=[1, 2]),
+    "lineage": lambda group: group.attrs.update(lineage="{}"),
+    "text array": lambda group: group.attrs.update(configuration=["a"] * 9),
 }  # fmt: skip
 
 
 @pytest.mark.parametrize("what", STRANGE)
-def test_a_strange_file_is_refused_before_anything_is_made_of_it(written, what, monkeypatch):
+def test_read_unexpected_structure_is_refused_first(refused, written, what, monkeypatch):
     """Sealed and with a matching hash, as a stranger can make it; "pipe" would block for ever."""
     monkeypatch.chdir(written.parent)
     os.mkfifo("pipe")
-    change, words = STRANGE[what]
     with h5py.File(written, "r+") as file:
         group = file["Checkpoint"]
-        change(group)
+        STRANGE[what](group)
         with contextlib.suppress(Exception):
             hashable = what not in ("outside", "virtual", "link", "empty", "chunks")
             state = {name: one[()] for name, one in group.items()} if hashable else {}
             group.attrs["sha256"] = checkpoint.state_hash(state)
     seal(written)
-    refused(written, words)
+    refused(written)
 
 
-def test_a_field_has_the_rank_that_its_part_declares(tmp_path, make_state):
+def test_read_field_of_other_rank_than_declared_is_refused(refused, tmp_path, make_state):
     """Of those that every scene has, the rank is checked before they are read."""
     path = tmp_path / "a.h5"
     checkpoint.write(path, make_state(alpha=0.1))
@@ -373,23 +375,23 @@ def test_a_field_has_the_rank_that_its_part_declares(tmp_path, make_state):
             {name: one[()] for name, one in group.items()}
         )
     seal(path)
-    refused(path, "alpha has the shape (2, 50), expected (50,)")
+    refused(path)
 
 
 @pytest.mark.parametrize(
     "link", [h5py.SoftLink("/Header"), h5py.ExternalLink("pipe", "/Checkpoint")]
 )
-def test_a_group_that_is_a_link_is_refused(written, link, monkeypatch):
+def test_read_linked_group_is_refused(refused, written, link, monkeypatch):
     monkeypatch.chdir(written.parent)
     os.mkfifo("pipe")
     with h5py.File(written, "r+") as file:
         del file["Checkpoint"]
         file["Checkpoint"] = link
     seal(written)
-    refused(written, "no group /Checkpoint")
+    refused(written)
 
 
-def test_no_particles(tmp_path, make_state):
+def test_read_file_without_particles_is_refused(refused, tmp_path, make_state):
     path = tmp_path / "a.h5"
     state = make_state()
     state.particles = state.particles.subset(np.zeros(0, np.int64))
@@ -399,10 +401,10 @@ def test_no_particles(tmp_path, make_state):
     with h5py.File(path, "w") as file:
         group = file.create_group("Checkpoint")
         checkpoint._write_private(group.id, state, checkpoint._state(state), digest)
-    refused(path, "0 particles")
+    refused(path)
 
 
-def test_fields_written_are_those_of_the_scene(tmp_path, make_state):
+def test_stored_fields_match_scene(tmp_path, make_state):
     path = tmp_path / "a.h5"
     state = make_state()
     checkpoint.write(path, state)
@@ -445,14 +447,14 @@ HOSTILE = {
 
 
 @pytest.mark.parametrize("what", HOSTILE)
-def test_a_hostile_list_of_fields_is_refused(what):
-    with pytest.raises(stored.Refused, match="its list of fields") as caught:
+def test_hostile_list_of_fields_is_refused(messages, what):
+    with messages.raised(stored.Refused, "its list of fields") as caught:
         stored.fields_of(HOSTILE[what])
     assert caught.value.kind == "foreign"
     assert str(caught.value).isprintable()
 
 
-def test_a_list_of_fields_is_read():
+def test_list_of_fields_gives_rank_and_remade():
     assert stored.fields_of('{"mass": [0, false], "a_b2": [2, true]}') == {
         "mass": (0, False),
         "a_b2": (2, True),
@@ -460,50 +462,52 @@ def test_a_list_of_fields_is_read():
 
 
 @pytest.mark.parametrize(
-    ("named", "words"),
+    "named",
     [
-        ({"mass": [1, False]}, "the field mass is of rank 1"),
-        ({"velocity": [7, False]}, "wrong name or rank: 'velocity'"),
-        ({"more": [0, False]}, "more missing"),
-        ({"more/less": [0, False]}, "wrong name or rank: 'more/less'"),
+        {"mass": [1, False]},
+        {"velocity": [7, False]},
+        {"more": [0, False]},
+        {"more/less": [0, False]},
     ],
+    ids=["rank", "high rank", "name", "path"],
 )
-def test_a_file_with_a_wrong_list_of_fields_is_refused(written, named, words):
+def test_read_wrong_list_of_fields_is_refused(refused, written, named):
     with h5py.File(written, "r+") as file:
         attributes = file["Checkpoint"].attrs
         attributes["fields"] = json.dumps(json.loads(attributes["fields"]) | named)
     seal(written)
-    refused(written, words)
+    refused(written)
 
 
-@pytest.mark.parametrize(("version", "word"), [(0, "an older"), (1000, "a newer")])
-def test_other_formats(written, version, word):
+@pytest.mark.parametrize("version", [0, 1000])
+def test_read_other_format_version_is_refused(refused, written, version):
     with h5py.File(written, "r+") as file:
         file["Checkpoint"].attrs["format_version"] = version
-    refused(written, word, f"({version})", f"({checkpoint.FORMAT_VERSION})")
+    refused(written)
 
 
-def test_configuration_that_this_version_does_not_take(written):
+def test_read_invalid_configuration_is_refused(messages, written):
     with h5py.File(written, "r+") as file:
         attributes = file["Checkpoint"].attrs
         text = attributes["configuration"].replace("eta = ", "etta = ")
         attributes["configuration"] = text
         attributes["configuration_sha256"] = checkpoint._text_hash(text)
-    with pytest.raises(FileError, match="etta"):
+    with messages.raised(FileError):
         checkpoint.read(written)
 
 
-def test_unwritable_place(tmp_path, make_state):
+def test_write_unwritable_directory_is_refused(messages, tmp_path, make_state):
     (tmp_path / "checkpoints").touch()
-    with pytest.raises(FileError, match=r"cannot write .*: Not a directory"):
+    with messages.raised(FileError):
         checkpoint.write(tmp_path / "checkpoints" / "checkpoint_000000.h5", make_state())
 
 
 def in_another_process(path, preparation):
     """Write a larger state to `path` in a process of its own, after `preparation`."""
+    here = Path(__file__).parent
     program = f"""
         import os, resource, signal, sys
-        sys.path[:0] = {[str(Path(__file__).parent), str(REFERENCE)]!r}
+        sys.path[:0] = {[str(here), str(REFERENCE)]!r}
         from conftest import random_state
         from sph.errors import FileError
         from sph.output import checkpoint, files, layout
@@ -523,7 +527,7 @@ def in_another_process(path, preparation):
 @pytest.mark.parametrize(
     "moment", ["layout._unit_attributes", "files.os.fsync", "files.os.replace"]
 )
-def test_killed_while_writing_leaves_the_old_checkpoint(written, make_state, moment):
+def test_write_killed_leaves_old_checkpoint(written, make_state, moment):
     whole = written.read_bytes()
     process = in_another_process(written, f"{moment} = die")
     assert process.returncode == -signal.SIGKILL, process.stderr
@@ -537,7 +541,7 @@ def test_killed_while_writing_leaves_the_old_checkpoint(written, make_state, mom
 
 @pytest.mark.slow
 @pytest.mark.parametrize("megabytes", [0, 1, 8, 21])
-def test_full_disk_leaves_the_old_checkpoint_and_says_so(written, megabytes):
+def test_write_full_disk_leaves_old_checkpoint_and_reports(written, megabytes):
     """A limit to the size of a file stands in for the disk: the state is of 21.6 MB."""
     whole = written.read_bytes()
     limit = f"resource.setrlimit(resource.RLIMIT_FSIZE, ({megabytes} << 20, {megabytes} << 20))"

@@ -36,7 +36,7 @@ def written(fill) -> bytes:
     return content.getvalue()
 
 
-def test_attributes_are_those_of_h5py():
+def test_attributes_equal_those_of_h5py():
     def ours(file):
         hdf5.write_attributes(hdf5.create_group(file.id, "Header"), ATTRIBUTES)
 
@@ -46,7 +46,7 @@ def test_attributes_are_those_of_h5py():
 
 
 @pytest.mark.parametrize("name", ARRAYS)
-def test_datasets_are_those_of_h5py(name):
+def test_dataset_equals_that_of_h5py(name):
     array = ARRAYS[name]
     assert written(lambda file: hdf5.write_dataset(file.id, "a", array)) == written(
         lambda file: file.create_dataset("a", data=array)
@@ -54,7 +54,7 @@ def test_datasets_are_those_of_h5py(name):
 
 
 @pytest.mark.parametrize("name", ["vector", "transposed", "part"])
-def test_checked_datasets_are_those_of_h5py(name):
+def test_checked_dataset_equals_that_of_h5py(name):
     array = ARRAYS[name]
     chunks = tuple(min(length, 4) for length in array.shape)
 
@@ -67,7 +67,7 @@ def test_checked_datasets_are_those_of_h5py(name):
     assert written(ours) == written(theirs)
 
 
-def test_links_are_those_of_h5py():
+def test_links_equal_those_of_h5py():
     def theirs(file):
         file["Density"] = h5py.SoftLink("/PartType0/Densities")
 

@@ -46,7 +46,7 @@ def public(tmp_path):
 
 
 @pytest.mark.parametrize("dimension", [1, 2, 3])
-def test_header(public, make_state, dimension):
+def test_header_describes_particles_and_box(public, make_state, dimension):
     state = make_state(dimension)
     file = public(state)
     header = dict(file["Header"].attrs)
@@ -69,7 +69,7 @@ def test_header(public, make_state, dimension):
     assert "Code" not in header
 
 
-def test_groups_without_datasets(public, make_state):
+def test_group_attributes(public, make_state):
     state = make_state(2)
     file = public(state)
     for name in ("Units", "InternalCodeUnits"):
@@ -90,7 +90,7 @@ def test_groups_without_datasets(public, make_state):
     assert scheme["CFL parameter"].tolist() == [state.config.physics.C]
 
 
-def test_any_equation_of_state_is_named_with_its_parameters(public, make_state):
+def test_equation_of_state_stored_with_parameters(public, make_state):
     state = make_state(1)
     gas = {"name": "stiffened_gas", "gamma": 4.4, "p_inf": 6e8}
     physics = state.config.physics.model_copy(update={"eos": gas, "gamma": None})
@@ -102,7 +102,7 @@ def test_any_equation_of_state_is_named_with_its_parameters(public, make_state):
 
 
 @pytest.mark.parametrize("alpha", [None, 0.1])
-def test_particle_datasets(public, make_state, alpha):
+def test_particle_datasets_match_state(public, make_state, alpha):
     state = make_state(2, alpha=alpha)
     group = public(state)["PartType0"]
     particles = state.particles
@@ -134,7 +134,7 @@ def test_particle_datasets(public, make_state, alpha):
     np.testing.assert_allclose(group["SmoothingLengths"], h, rtol=5e-7)
 
 
-def test_units_of_fields(public, make_state):
+def test_field_units_are_stored(public, make_state):
     group = public(make_state(3, alpha=0.1))["PartType0"]
     length_mass_time = {
         "Coordinates": (1, 0, 0),
@@ -160,7 +160,7 @@ def test_units_of_fields(public, make_state):
 
 
 @pytest.mark.parametrize("dimension", [1, 2, 3])
-def test_coordinates_are_shifted_and_unused_axes_are_in_the_middle(public, make_state, dimension):
+def test_coordinates_shifted_and_unused_axes_centred(public, make_state, dimension):
     state = make_state(dimension)
     file = public(state)
     position = state.particles.position
@@ -174,9 +174,7 @@ def test_coordinates_are_shifted_and_unused_axes_are_in_the_middle(public, make_
     assert np.all(coordinates[:, dimension:] == size[dimension:] / 2)
 
 
-def test_particles_just_outside_a_periodic_box_are_wrapped_in_the_public_group_only(
-    public, make_state
-):
+def test_particles_outside_periodic_box_wrapped_in_public_group_only(public, make_state):
     state = make_state(2)
     y = state.particles.position[1]
     y[:4] = -1e-3, -1e-20, 0.25, np.nextafter(0.25, 0)
@@ -190,9 +188,7 @@ def test_particles_just_outside_a_periodic_box_are_wrapped_in_the_public_group_o
 
 
 @pytest.mark.parametrize("boundary", ["open", "mirror"])
-def test_box_is_widened_to_hold_what_left_an_axis_that_is_not_periodic(
-    public, make_state, boundary
-):
+def test_box_widened_to_particles_outside_open_axis(public, make_state, boundary):
     state = make_state(2, boundary=boundary)
     state.particles.position[0, :2] = -3.0, 1.5
     file = public(state)

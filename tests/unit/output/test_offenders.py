@@ -21,7 +21,7 @@ def failed(make_state):
     return state_of
 
 
-def test_neighbours_are_those_of_either_support_nearest_first_across_the_faces(failed, tmp_path):
+def test_neighbours_in_either_support_nearest_first_across_faces(failed, tmp_path):
     state = failed([0.45, -0.2, 0.41, -0.48, 0.1], [0.08, 0.4, 0.01, 0.01, 0.2])
     path = tmp_path / "offenders.h5"
     words = offenders.leave(path, state, 1)
@@ -41,29 +41,29 @@ def test_neighbours_are_those_of_either_support_nearest_first_across_the_faces(f
     assert str(path) in where
 
 
-def test_more_than_a_screen_of_them_are_counted(failed, tmp_path):
+def test_many_neighbours_are_counted_not_listed(failed, tmp_path):
     state = failed(np.linspace(-0.1, 0.1, 12), 0.3)
     words = offenders.leave(tmp_path / "offenders.h5", state, 4).splitlines()
     assert len(words) == 1 + offenders.SHOWN + 2
     assert words[-2] == f"... and {12 - offenders.SHOWN} more neighbours."
 
 
-def test_a_particle_that_is_nowhere_comes_first_and_alone(failed, tmp_path):
+def test_particle_with_nan_position_listed_first_and_alone(failed, tmp_path):
     state = failed([0.1, np.nan, 0.2], [0.3, np.nan, 0.3])
     offenders.leave(tmp_path / "offenders.h5", state, 2)
     assert checkpoints.read(tmp_path / "offenders.h5").particles.id.tolist() == [2]
 
 
-def test_one_in_the_same_place_comes_after_the_particle(failed, tmp_path):
+def test_coincident_neighbour_listed_after_particle(failed, tmp_path):
     offenders.leave(tmp_path / "offenders.h5", failed([0.1, 0.1], 0.2), 2)
     assert checkpoints.read(tmp_path / "offenders.h5").particles.id.tolist() == [2, 1]
 
 
-def test_nothing_is_left_of_no_particle(failed, tmp_path):
+def test_fault_without_particle_writes_no_offenders(failed, tmp_path):
     assert offenders.leave(tmp_path / "offenders.h5", failed([0.1], 0.2), 0) == ""
     assert not (tmp_path / "offenders.h5").exists()
 
 
-def test_what_cannot_be_written_does_not_hide_what_went_wrong(failed, tmp_path):
+def test_unwritable_offenders_keep_original_error(failed, tmp_path):
     words = offenders.leave(tmp_path / "none" / "offenders.h5", failed([0.1], 0.2), 1)
     assert "could not be written: " in words

@@ -52,11 +52,18 @@ def check(run, number=2, into=None):
     run.check_belongs(path, checkpoint.read(path), into)
 
 
-def refused(run, words, **settings):
-    with pytest.raises(FileError, match=words) as caught:
-        check(run, **settings)
-    assert "\nTry: " in str(caught.value)
-    assert caught.value.exit_code == 4
+@pytest.fixture
+def refused(messages):
+    """refused(run, *facts): the run is not consistent, and the error has these facts."""
+
+    def checked(run, *facts, **settings):
+        # sums over particles, whose last digits vary by processor
+        sums = r"(?<=but )\d+\.\d{6,}"
+        with messages.raised(FileError, *facts, "\nTry: ", mask=sums) as caught:
+            check(run, **settings)
+        assert caught.value.exit_code == 4
+
+    return checked
 
 
 def lines(run, change):
@@ -75,32 +82,33 @@ def with_value(run, step, column, value):
     lines(run, change)
 
 
-def test_a_run_as_it_was_written(run):
+def test_unchanged_run_is_consistent(run):
     for number in range(4):
         check(run, number)
 
 
 @pytest.mark.parametrize(
-    ("change", "words"),
+    ("change", "fact"),
     [
-        (lambda text: text[:3] + text[4:], "step 2 is missing before step 3"),
+        (lambda text: text[:3] + text[4:], "step 2"),
         (lambda text: text[:-2], None),
-        (lambda text: text[:5], "step 4, that of the checkpoint, is missing"),
-        (lambda text: text[:1], "step 4, that of the checkpoint, is missing"),
-        (lambda text: [*text[:4], text[3], *text[4:]], "step 3 is missing before step 2"),
-        (lambda text: ["step,t\n"], "has no columns dt"),
-        (lambda text: [text[0].replace("energy_drift,", "drift,"), *text[1:]],
-         "has no columns energy_drift: .* another version"),
+        (lambda text: text[:5], "step 4"),
+        (lambda text: text[:1], "step 4"),
+        (lambda text: [*text[:4], text[3], *text[4:]], "step 3"),
+        (lambda text: ["step,t\n"], " dt"),
+        (lambda text: [text[0].replace("energy_drift,", "drift,"), *text[1:]], " energy_drift"),
         (lambda text: [text[0].replace("cpu_seconds\n", "cpu_seconds,strange\n"),
-                       *(one[:-1] + ",1.0\n" for one in text[1:])], "it has columns strange"),
+                       *(one[:-1] + ",1.0\n" for one in text[1:])], " strange"),
     ],
+    ids=["gap", "last row missing", "checkpoint's row missing", "no rows", "row twice",
+         "two columns", "column renamed", "column added"],
 )  # fmt: skip
-def test_a_history_with_a_gap_or_other_columns(run, change, words):
+def test_history_with_gap_or_other_columns_is_refused(refused, run, change, fact):
     lines(run, change)
-    if words is None:  # what comes after the checkpoint is done anew
+    if fact is None:  # what comes after the checkpoint is done anew
         check(run)
     else:
-        refused(run, words)
+        refused(run, fact)
 
 
 @pytest.mark.parametrize(
@@ -114,27 +122,27 @@ def test_a_history_with_a_gap_or_other_columns(run, change, words):
         (4, "kinetic_energy", "1.0"),
     ],
 )
-def test_a_history_of_other_values(run, step, column, value):
+def test_history_of_other_values_is_refused(refused, run, step, column, value):
     if column == "t":
         value = "1.00001"
     with_value(run, step, column, value)
-    refused(run, f"belongs to another run: {column} = {float(value)} at step {step}")
+    refused(run, f"{column} = {float(value)}", f"step {step}")
 
 
-def test_a_history_that_is_missing(run):
+def test_missing_history_is_refused(refused, run):
     run.history.unlink()
-    refused(run, "history not found")
+    refused(run, "history")
     check(run, 0)  # as a copied checkpoint that was not gone on from yet
 
 
-def test_a_configuration_of_another_problem(run, make_state):
+def test_configuration_of_other_problem_is_refused(refused, run, make_state):
     run.write_config(make_state(dimension=2).config.to_toml())
-    refused(run, r"config\.toml belongs to another run: problem\.dimension, problem\.domain")
+    refused(run, "config.toml", "problem.dimension", "problem.domain")
 
 
 @pytest.mark.parametrize("number", [1, 3])  # the one before the checkpoint and the one after
 @pytest.mark.parametrize("what", ["dimension", "alpha", "step", "time", "lineage", "particles"])
-def test_a_checkpoint_of_another_run(run, state, make_state, number, what):
+def test_checkpoint_of_other_run_is_refused(refused, run, state, make_state, number, what):
     step = 2 * number
     others = {
         "dimension": at_step(make_state(dimension=2), step),
@@ -147,18 +155,12 @@ def test_a_checkpoint_of_another_run(run, state, make_state, number, what):
     if what == "lineage" and number == 3:
         checkpoint.write(run.checkpoint_path(2), at_step(state, 4, lineage=("ours",)))
     checkpoint.write(run.checkpoint_path(number), others[what])
-    words = {
-        "dimension": r"problem\.dimension",
-        "alpha": "alpha = 1.0 and alpha = 3.0" if number == 3 else "alpha = 3.0 and alpha = 1.0",
-        "step": "is not after step",
-        "time": "is not after step",
-        "lineage": "its lineage does not continue",
-        "particles": "its particle IDs differ",
-    }
-    refused(run, f"belongs to another run: .*{words[what]}")
+    facts = {"dimension": "problem.dimension", "alpha": "alpha = 3.0", "lineage": "lineage",
+             "particles": "particle"}  # fmt: skip
+    refused(run, facts.get(what, "step"))
 
 
-def test_a_session_may_have_other_settings_if_its_lineage_says_so(run, state):
+def test_other_settings_accepted_only_with_lineage(run, state):
     later = at_step(
         state, 6, lineage=("restarted",), config=state.config.override(["physics.alpha=3.0"])
     )
@@ -166,27 +168,27 @@ def test_a_session_may_have_other_settings_if_its_lineage_says_so(run, state):
     check(run)
 
 
-def test_a_newer_format_is_neither_passed_over_nor_replaced(run):
+def test_newer_format_is_refused_not_skipped(refused, messages, run):
     with h5py.File(run.checkpoint_path(3), "r+") as file:
         file["Checkpoint"].attrs["format_version"] = 1000
-    with pytest.raises(FileError, match="a newer format"):
+    with messages.raised(FileError, "(1000)"):
         run.latest()
-    refused(run, "a newer format")
+    refused(run, "(1000)")
     check(run, into=run.path.parent / "elsewhere")  # where nothing is replaced
-    refused(run, "a newer format", into=run.path / "." / "")
+    refused(run, "(1000)", into=run.path / "." / "")
 
 
-def test_what_is_damaged_is_no_obstacle(run):
+def test_damaged_files_are_skipped(run):
     for number in (1, 3):
         run.checkpoint_path(number).write_bytes(b"damaged")
     check(run)
     assert run.latest() == run.checkpoint_path(2)
 
 
-def test_a_checkpoint_that_cannot_be_read_is_not_passed_over(run, monkeypatch):
+def test_unreadable_checkpoint_is_refused_not_skipped(messages, run, monkeypatch):
     last = run.checkpoint_path(3)
     last.unlink()
     last.symlink_to(run.path)  # reading a directory fails, whoever reads
-    with pytest.raises(FileError, match="cannot read") as caught:
+    with messages.raised(FileError) as caught:
         run.latest()
     assert not isinstance(caught.value, files.Damaged)

@@ -48,15 +48,15 @@ def called(config, target, *arguments):
 
 
 @pytest.fixture(scope="module")
-def searched(tube):
+def first_search(tube):
     """The first search, and its directory."""
     target = tube.parent / "found"
     return called(tube, target, "--jobs", "2"), target
 
 
 @pytest.mark.slow
-def test_a_search_finds_the_largest_stable_courant_number(searched):
-    result, target = searched
+def test_search_finds_largest_stable_courant_number(first_search):
+    result, target = first_search
     assert result.exit_code == 0, result.output
     found = json.loads((target / "physics.C.json").read_text())
     end = found["ends"]["largest"]
@@ -81,8 +81,8 @@ def test_a_search_finds_the_largest_stable_courant_number(searched):
 
 
 @pytest.mark.slow
-def test_a_run_that_stops_itself_is_a_verdict_with_its_reason(searched):
-    _, target = searched
+def test_failed_run_is_unstable_with_reason(first_search):
+    _, target = first_search
     trials = json.loads((target / "physics.C.json").read_text())["trials"]
     failed = [trial for trial in trials if trial["verdict"] == "failed"]
     assert failed, "the drift that is allowed is too large for this test"
@@ -93,8 +93,8 @@ def test_a_run_that_stops_itself_is_a_verdict_with_its_reason(searched):
 
 
 @pytest.mark.slow
-def test_runs_that_are_there_are_not_repeated_and_judged_anew(searched, tube):
-    _, target = searched
+def test_existing_runs_are_judged_without_running_again(first_search, tube):
+    _, target = first_search
     before = {path: path.stat().st_mtime_ns for path in target.glob("*/summary.json")}
     words = (target / "physics.C.json").read_text()
     again = called(tube, target, "--jobs", "2")
@@ -109,8 +109,8 @@ def test_runs_that_are_there_are_not_repeated_and_judged_anew(searched, tube):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("word", ["nan", "inf"])
-def test_an_error_that_is_no_number_is_beyond_the_limit(searched, tmp_path, word):
-    _, target = searched
+def test_nan_error_is_beyond_limit(first_search, tmp_path, word):
+    _, target = first_search
     run = shutil.copytree(target / "default", tmp_path / "default")
     summary = json.loads((run / "summary.json").read_text())
     summary["errors"]["fields"]["pressure"]["L1"] = word
@@ -121,8 +121,8 @@ def test_an_error_that_is_no_number_is_beyond_the_limit(searched, tmp_path, word
 
 
 @pytest.mark.slow
-def test_a_killed_run_goes_on(searched, tube):
-    _, target = searched
+def test_killed_search_continues_its_run(first_search, tube):
+    _, target = first_search
     run = target / "default"
     summary = run / "summary.json"
     before = json.loads(summary.read_text())
@@ -134,8 +134,8 @@ def test_a_killed_run_goes_on(searched, tube):
 
 
 @pytest.mark.slow
-def test_another_configuration_in_the_directory_is_refused(searched, tube):
-    _, target = searched
+def test_directory_of_other_configuration_is_refused(first_search, tube):
+    _, target = first_search
     result = called(tube, target, "--set", "problem.n=50")
     assert result.exit_code == 2
     assert "of another configuration" in result.stderr
@@ -152,28 +152,28 @@ def test_another_configuration_in_the_directory_is_refused(searched, tube):
         (["--set", "problem.m=3"], "problem.m"),
     ],
 )
-def test_a_wrong_command_exits_with_2(tube, tmp_path, arguments, said):
+def test_wrong_option_exits_with_2(tube, tmp_path, arguments, said):
     result = called(tube, tmp_path / "out", *arguments)
     assert result.exit_code == 2, result.output
     assert said in result.stderr
     assert not (tmp_path / "out").exists()
 
 
-def test_a_missing_configuration_exits_with_4(tmp_path):
+def test_missing_configuration_exits_with_4(tmp_path):
     assert called(tmp_path / "none.toml", tmp_path / "out").exit_code == 4
 
 
 @pytest.mark.slow
-def test_a_reference_that_fails_exits_with_3(tube, tmp_path):
+def test_failed_reference_run_exits_with_3(tube, tmp_path):
     result = called(tube, tmp_path / "out", "--set", "physics.max_energy_drift=1e-15")
     assert result.exit_code == 3, result.output
     assert "the reference run physics.C=0.0375 fails: step" in result.stderr
 
 
 @pytest.mark.slow
-def test_a_run_that_is_refused_is_a_verdict_with_its_reason(searched, tube):
+def test_refused_run_is_unstable_with_reason(first_search, tube):
     """At eta = 5e4 a support takes more than a thousand images of the box."""
-    _, target = searched
+    _, target = first_search
     trials = Trials(tube, "physics.eta", (), target, Criterion(), 1)
     assert trials.are_stable([5e4]) == [False]
     assert trials.done[5e4].verdict == "failed"
@@ -181,7 +181,7 @@ def test_a_run_that_is_refused_is_a_verdict_with_its_reason(searched, tube):
 
 
 @pytest.mark.slow
-def test_without_an_exact_solution_runs_are_held_to_the_reference(tmp_path):
+def test_runs_without_exact_solution_compared_with_reference(tmp_path):
     path = tmp_path / "four.toml"
     path.write_text(
         '[problem]\nname = "particles"\n[time]\nend = 0.05\n[output]\ninterval = 0.05\n'
@@ -203,8 +203,8 @@ def test_without_an_exact_solution_runs_are_held_to_the_reference(tmp_path):
 
 
 @pytest.mark.slow
-def test_islands_of_stability_are_told(searched, tube):
-    _, target = searched
+def test_islands_of_stability_are_reported(first_search, tube):
+    _, target = first_search
     found = command.run(tube, "physics.C", (), target, ("resolution=1.5",), 2)
     reference, default, *more = (trial.value for trial in found.trials if trial.is_stable)
     assert more
@@ -226,8 +226,8 @@ def changed(run, target, change):
 
 
 @pytest.mark.slow
-def test_energy_drift_is_held_to_the_problem_or_to_the_reference(searched, tmp_path):
-    _, target = searched
+def test_energy_drift_judged_by_problem_or_reference(first_search, tmp_path):
+    _, target = first_search
     reference, default = target / "physics.C=0.0375", target / "default"
     judge = Judge(reference, Criterion())
     allowed = judge.state.config.problem.limits["energy_drift"].bound
@@ -247,8 +247,8 @@ def test_energy_drift_is_held_to_the_problem_or_to_the_reference(searched, tmp_p
 
 
 @pytest.mark.slow
-def test_the_limits_of_the_problem_are_kept_too(searched, tmp_path, monkeypatch):
-    _, target = searched
+def test_problem_limits_are_judged(first_search, tmp_path, monkeypatch):
+    _, target = first_search
     reference, default = target / "physics.C=0.0375", target / "default"
     bound = {"momentum_change": base.Limit(0.5, "a test"), "no_figure": base.Limit(1.0, "none")}
     problem = type(Judge(reference, Criterion()).state.config.problem)
@@ -274,7 +274,7 @@ def test_the_limits_of_the_problem_are_kept_too(searched, tmp_path, monkeypatch)
 
 
 @pytest.mark.slow
-def test_without_an_exact_solution_figures_are_those_of_the_reference(tmp_path):
+def test_figures_without_exact_solution_compared_with_reference(tmp_path):
     """A mode may be a hundredth of the flow: in the fields its loss would not be seen."""
     path = tmp_path / "four.toml"
     path.write_text(
@@ -297,7 +297,7 @@ def test_without_an_exact_solution_figures_are_those_of_the_reference(tmp_path):
 
 
 @pytest.mark.slow
-def test_a_shortened_search_says_what_it_did_not_run(tmp_path):
+def test_shortened_search_lists_skipped_runs(tmp_path):
     path = tmp_path / "four.toml"
     path.write_text(
         '[problem]\nname = "particles"\n[time]\nend = 0.05\n[output]\ninterval = 0.05\n'
@@ -311,9 +311,9 @@ def test_a_shortened_search_says_what_it_did_not_run(tmp_path):
 
 
 @pytest.mark.slow
-def test_errors_below_a_part_of_the_field_do_not_count(searched, tmp_path):
+def test_errors_below_fraction_of_field_are_ignored(first_search, tmp_path):
     """Against a reference without errors: of velocity, a part of the mean |v| + c_s."""
-    _, target = searched
+    _, target = first_search
 
     def exact(summary):
         for norms in summary["errors"]["fields"].values():
@@ -333,7 +333,7 @@ def test_errors_below_a_part_of_the_field_do_not_count(searched, tmp_path):
 
 
 @pytest.mark.slow
-def test_particles_are_compared_by_their_ids(tmp_path):
+def test_particles_compared_by_id(tmp_path):
     """Runs that order them otherwise, as their lists ask, have no error by that."""
     path = tmp_path / "four.toml"
     path.write_text(
@@ -348,7 +348,7 @@ def test_particles_are_compared_by_their_ids(tmp_path):
     assert judge.trial(0.0375, turned.path).error == 0.0
 
 
-def test_help_and_document_tell_the_limits_there_are():
+def test_help_and_document_list_all_limits():
     text = Path(__file__).parents[3].joinpath("docs/stability.md").read_text(encoding="utf-8")
     told = dict(re.findall(r"^\| `(\w+)` \| ([\de.+-]+) \|", text, re.MULTILINE))
     assert {name: float(value) for name, value in told.items()} == Criterion._field_defaults
@@ -356,7 +356,7 @@ def test_help_and_document_tell_the_limits_there_are():
     assert all(name in said for name in Criterion._fields)
 
 
-def test_criterion_takes_what_is_set():
+def test_criterion_uses_options():
     assert Criterion.of(["deviation=0.1"]).deviation == 0.1
     with pytest.raises(ConfigError, match="expected a number above 1"):
         Criterion.of(["resolution=many"])

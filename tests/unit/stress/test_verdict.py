@@ -45,11 +45,11 @@ BY_EXIT = Failing(exit="energy has changed", because="so")
         (BY_EXIT, [HOLDS], "", UNEXPECTED_PASS),
     ],
 )
-def test_verdicts(fails, checks, ended, verdict):
+def test_verdict_from_checks_and_outcome(fails, checks, ended, verdict):
     assert _verdict(fails, tuple(checks), ended)[0] == verdict
 
 
-def test_the_worst_check_is_a_broken_one_then_an_error_nearest_to_its_bound():
+def test_worst_check_is_failed_one_else_nearest_to_bound():
     nearer = Check("c", 1.9, Bound(at_most=2.0, why="-"))
     least = Check("d", 2.0, Bound(at_least=2.0, why="-"))
     too_little = Check("e", 1.0, Bound(at_least=2.0, why="-"))
@@ -63,7 +63,7 @@ def test_the_worst_check_is_a_broken_one_then_an_error_nearest_to_its_bound():
     assert worst(everyone) is None
 
 
-def test_a_setting_goes_before_its_case_and_both_before_what_holds_for_all():
+def test_bounds_of_setting_override_case_and_suite():
     drift = "conservation.energy_drift_max"
     bounds = [{drift: {"at_most": most, "why": "-"}} for most in (0.1, 0.2)]
     settings = {"own": {"about": "-", "limits": bounds[1]}, "plain": {"about": "-"}}
@@ -84,7 +84,7 @@ def state(velocity, energy, order):
     return Checkpoint(particles, 0.0, 0, 0.1, x, np.ones(3), 0.1, None, ())
 
 
-def test_change_is_of_each_particle_and_of_vectors_over_the_longest(tmp_path):
+def test_change_is_per_particle_relative_to_longest_vector(tmp_path):
     figures = Figures(tmp_path, {})
     figures._first = state([[3.0, 0.0, 0.0], [4.0, 0.0, 1.0]], [1.0, 2.0, 4.0], [0, 1, 2])
     figures._last = state([[3.0, 0.5, 0.0], [4.0, 0.0, 1.0]], [1.0, 2.5, 4.0], [2, 0, 1])
@@ -92,7 +92,7 @@ def test_change_is_of_each_particle_and_of_vectors_over_the_longest(tmp_path):
     assert figures.value("change.internal_energy") == 0.25
 
 
-def test_relative_errors_are_of_the_region_alone(tmp_path):
+def test_relative_errors_limited_to_error_region(tmp_path):
     problem = SimpleNamespace(
         exact=lambda *_: {"density": np.array([1.0, 2.0, 4.0])},
         error_region=lambda *_: (np.array([True, True, False]), "but the last"),
@@ -113,7 +113,7 @@ def test_relative_errors_are_of_the_region_alone(tmp_path):
     assert np.isnan(figures.value("relative.density.L1"))
 
 
-def test_only_a_pass_and_a_failure_as_written_are_expected():
+def test_expected_verdicts_are_pass_and_expected_failure():
     expected = {
         one for one in (PASS, SHORT, EXPECTED_FAILURE, UNEXPECTED_FAILURE, UNEXPECTED_PASS)
         if Result("case", "setting", one, "", (), {}, {}).is_expected
@@ -121,7 +121,7 @@ def test_only_a_pass_and_a_failure_as_written_are_expected():
     assert expected == {PASS, EXPECTED_FAILURE}
 
 
-def test_every_broken_check_is_told():
+def test_every_failed_check_is_reported():
     missing = Check("c", float("nan"), Bound(at_least=1.0, why="-"))
     said = "b is 3, expected at most 2; c is missing, expected at least 1"
     assert _verdict(None, (BROKEN, HOLDS, missing), "") == (SHORT, said)
@@ -187,18 +187,18 @@ def ended(tmp_path):
         ("state.none.min", np.nan),
     ],
 )
-def test_a_figure_of_each_kind(ended, name, value):
+def test_figure_of_each_kind_is_evaluated(ended, name, value):
     assert ended.value(name) == pytest.approx(value, nan_ok=True, rel=1e-15)
 
 
-def test_first_and_last_are_those_checkpoints(tmp_path, monkeypatch):
+def test_first_and_last_refer_to_checkpoints(tmp_path, monkeypatch):
     found = Figures(tmp_path, {})
     monkeypatch.setattr(type(found.run), "checkpoints", lambda _: ["first", "second", "last"])
     monkeypatch.setattr("sph.output.checkpoint.read", lambda path: path)
     assert (found._first, found._last) == ("first", "last")
 
 
-def test_figures_of_a_sign_and_of_unequal_volumes(tmp_path):
+def test_figures_keep_sign_and_weigh_by_volume(tmp_path):
     """Relative to the size of what is exact, which may be negative, and weighed by m/rho."""
     problem = SimpleNamespace(
         exact=lambda *_: {"density": np.array([-1.0, 2.0])},
@@ -219,7 +219,7 @@ def test_figures_of_a_sign_and_of_unequal_volumes(tmp_path):
     assert figures.value("relative.density.L1") == 0.5 * 3.0 / 4.0
 
 
-def test_columns_of_every_case_are_the_worst_of_the_run(ended, tmp_path):
+def test_case_columns_are_worst_of_run(ended, tmp_path):
     row = Row(tmp_path, "a", {"physics.scheme": "grad_h"}, ended.summary, "done")
     assert verdicts._numbers(row, ended) == {
         "scheme": "grad_h",
@@ -234,7 +234,7 @@ def test_columns_of_every_case_are_the_worst_of_the_run(ended, tmp_path):
     assert verdicts._numbers(None, ended) == {}
 
 
-def test_a_run_without_a_summary_is_judged_by_why_it_never_was(tmp_path, monkeypatch):
+def test_run_without_summary_judged_by_its_failure(tmp_path, monkeypatch):
     task = SimpleNamespace(run=SimpleNamespace(path=tmp_path), status=None)
     monkeypatch.setattr(verdicts, "standing", lambda _: SimpleNamespace(reason="the disk is full"))
     case = Case(

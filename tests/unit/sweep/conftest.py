@@ -1,7 +1,7 @@
 """A sweep command, and a sweep whose worker and parent process were killed."""
 
 import pytest
-from sweeps import Killed, Program
+from sweeps import KilledSweep, Program
 
 
 @pytest.fixture
@@ -10,5 +10,5 @@ def program(tmp_path):
 
 
 @pytest.fixture(scope="session")
-def killed(tmp_path_factory):
-    return Killed(tmp_path_factory.mktemp("killed"))
+def killed_sweep(tmp_path_factory):
+    return KilledSweep(tmp_path_factory.mktemp("killed"))

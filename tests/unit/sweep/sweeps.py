@@ -98,7 +98,7 @@ def hashes(sweep_directory):
     return found
 
 
-class Killed:
+class KilledSweep:
     """A sweep of twelve points whose worker and whose parent were killed, and its second call."""
 
     def __init__(self, directory):

@@ -14,8 +14,8 @@ STOPPED = Outcome("d", "stopped", "with a checkpoint", how="run")
 
 
 @pytest.fixture
-def told(capsys):
-    """told(*outcomes): what was said of twelve points, two of which were done before."""
+def printed_of(capsys):
+    """printed_of(*outcomes): what was said of twelve points, two of which were done before."""
 
     def after(*outcomes):
         one = _Told(12, 2)
@@ -27,8 +27,8 @@ def told(capsys):
     return after
 
 
-def test_each_point_has_a_line_with_its_number_mark_and_reason(told):
-    _, said = told(DONE, WARNED, FAILED, STOPPED)
+def test_each_point_has_line_with_number_mark_and_reason(printed_of):
+    _, said = printed_of(DONE, WARNED, FAILED, STOPPED)
     lines = [line for line in said.splitlines() if line.startswith("[")]
     assert "2 of 12 points are done already" in said
     assert lines == [
@@ -39,21 +39,21 @@ def test_each_point_has_a_line_with_its_number_mark_and_reason(told):
     ]
 
 
-def test_points_that_are_done_and_those_with_warnings_are_counted(told):
-    assert told(DONE)[0].closing() == "3 of 12 points are done."
-    both = told(DONE, WARNED)[0].closing()
+def test_finished_points_and_points_with_warnings_are_counted(printed_of):
+    assert printed_of(DONE)[0].closing() == "3 of 12 points are done."
+    both = printed_of(DONE, WARNED)[0].closing()
     assert both == "4 of 12 points are done, 1 of them ended with warnings."
 
 
-def test_points_that_failed_come_before_those_that_were_stopped(told):
+def test_failed_points_listed_before_stopped_points(printed_of):
     with pytest.raises(NumericalError) as caught:
-        told(DONE, STOPPED, FAILED)[0].closing()
+        printed_of(DONE, STOPPED, FAILED)[0].closing()
     assert str(caught.value) == "3 of 12 points are done, 1 failed:\n  c: no more"
     with pytest.raises(Stopped, match=r"^4 of 12 points are done; the same command"):
-        told(DONE, WARNED, STOPPED)[0].closing()
+        printed_of(DONE, WARNED, STOPPED)[0].closing()
 
 
-def test_a_sweep_runs_what_is_not_done_and_counts_the_rest(tmp_path, monkeypatch, capsys):
+def test_sweep_runs_unfinished_points_and_counts_rest(tmp_path, monkeypatch, capsys):
     (tmp_path / "tube.toml").write_text('[problem]\nname = "shock_tube"\nn = 40\n')
     names = [f"physics.C={value}" for value in (0.1, 0.2, 0.3)]
     statuses = dict(zip(names, ("done", "failed", None), strict=True))

@@ -51,16 +51,16 @@ def address(tmp_path):
 
 
 @pytest.mark.slow
-def test_the_same_sweep_by_dask_gives_the_same_numbers(killed, cluster, program, tmp_path):
+def test_sweep_by_dask_equals_local_sweep(killed_sweep, cluster, program, tmp_path):
     """Bit for bit those of a sweep that was killed and went on from checkpoints."""
     result = program.run(*TWELVE, "--scheduler", cluster.scheduler_address, "-o", tmp_path / "dask")
     assert result.exit_code == 0, result.output
     assert len(runs(tmp_path / "dask")) == 12
-    assert hashes(tmp_path / "dask") == hashes(killed.path)
+    assert hashes(tmp_path / "dask") == hashes(killed_sweep.path)
 
 
 @pytest.mark.slow
-def test_a_scheduler_of_its_own(address, program, tmp_path):
+def test_sweep_with_external_scheduler_reports_failures(address, program, tmp_path):
     path = tmp_path / "sweep"
     arguments = ("--vary", "physics.max_energy_drift=0.02,1e-15", "--set", "time.end=0.002",
                  "--scheduler", address, "-o", path)  # fmt: skip
@@ -74,7 +74,7 @@ def test_a_scheduler_of_its_own(address, program, tmp_path):
 
 
 @pytest.mark.slow
-def test_a_stop_reaches_the_workers(cluster, program, tmp_path):
+def test_sigterm_stops_dask_workers(cluster, program, tmp_path):
     path = tmp_path / "sweep"
     process = program.started("--vary", "problem.n=40,50,60", "--set", "time.end=4.0",
                               "--scheduler", cluster.scheduler_address, "-o", path)  # fmt: skip
@@ -87,7 +87,7 @@ def test_a_stop_reaches_the_workers(cluster, program, tmp_path):
     assert sum(run.summary.exists() for run in runs(path).values()) == 2
 
 
-def test_a_worker_that_does_not_see_the_files(cluster, program, tmp_path, monkeypatch):
+def test_worker_without_shared_files_is_reported(cluster, program, tmp_path, monkeypatch):
     from sph.sweep import distributed as ours
     from sph.sweep.manifest import SweepDirectory
     from sph.sweep.plan import Point
@@ -100,7 +100,7 @@ def test_a_worker_that_does_not_see_the_files(cluster, program, tmp_path, monkey
     assert "the files of a sweep must be shared" in told[0].reason
 
 
-def test_no_scheduler_answers(program, tmp_path, monkeypatch):
+def test_unreachable_scheduler_exits_with_4(program, tmp_path, monkeypatch):
     monkeypatch.setattr("sph.sweep.distributed.CONNECT_SECONDS", 0.2)
     result = program.run("--vary", "problem.n=40", "-o", tmp_path / "sweep",
                          "--scheduler", "tcp://127.0.0.1:9")  # fmt: skip
@@ -115,7 +115,7 @@ def test_no_scheduler_answers(program, tmp_path, monkeypatch):
         (["--slurm", "timeout_min=5"], "submitit", 'pip install "sph[slurm]"'),
     ],
 )
-def test_a_missing_extra_is_named(arguments, module, words, program, tmp_path, monkeypatch):
+def test_missing_extra_is_named(arguments, module, words, program, tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, module, None)
     result = program.run("--vary", "problem.n=40", "-o", tmp_path / "sweep", *arguments)
     assert result.exit_code == 2

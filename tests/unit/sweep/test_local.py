@@ -33,45 +33,45 @@ def prepared(program, *varies):
 
 
 @pytest.mark.slow
-def test_a_killed_sweep_run_again_ends_with_all_points(killed):
-    assert killed.second.exit_code == 0, killed.second.output
-    assert "12 of 12 points are done." in killed.second.stdout
-    found = summaries(killed.path)
+def test_killed_sweep_run_again_finishes_all_points(killed_sweep):
+    assert killed_sweep.second.exit_code == 0, killed_sweep.second.output
+    assert "12 of 12 points are done." in killed_sweep.second.stdout
+    found = summaries(killed_sweep.path)
     assert len(found) == 12
     assert {summary["status"] for summary in found.values()} == {"done"}
     assert {summary["time"] for summary in found.values()} == {0.4}
 
 
 @pytest.mark.slow
-def test_a_killed_sweep_repeats_no_work(killed):
-    assert "stopped: ended by signal 9" in killed.told
-    assert 4 <= len(killed.before) < 12  # else nothing was killed
-    for name, run in runs(killed.path).items():
-        assert attempts(killed.path, name).count("run") == 1
+def test_killed_sweep_run_again_repeats_no_work(killed_sweep):
+    assert "stopped: ended by signal 9" in killed_sweep.told
+    assert 4 <= len(killed_sweep.before) < 12  # else nothing was killed
+    for name, run in runs(killed_sweep.path).items():
+        assert attempts(killed_sweep.path, name).count("run") == 1
         steps = read_history(run.history)["step"]
         assert steps.tolist() == list(range(steps.size))
-        if name in killed.before:
-            assert run.summary.stat().st_mtime_ns == killed.before[name]
-    assert attempts(killed.path, killed.worker) == ["run", "restart"]
-    with h5py.File(runs(killed.path)[killed.worker].checkpoints()[-1]) as file:
+        if name in killed_sweep.before:
+            assert run.summary.stat().st_mtime_ns == killed_sweep.before[name]
+    assert attempts(killed_sweep.path, killed_sweep.worker) == ["run", "restart"]
+    with h5py.File(runs(killed_sweep.path)[killed_sweep.worker].checkpoints()[-1]) as file:
         (lineage,) = json.loads(file["Checkpoint"].attrs["lineage"])
     assert lineage.startswith("restarted at step")
     assert "step 0," not in lineage
 
 
 @pytest.mark.slow
-def test_a_sweep_that_is_done_does_nothing(killed):
-    before = killed.done()
-    again = killed.program.run("--vary", "problem.n=40", "--vary", "physics.alpha=0.5,1.0",
-                               "-o", killed.path)  # fmt: skip
+def test_finished_sweep_does_nothing(killed_sweep):
+    before = killed_sweep.done()
+    again = killed_sweep.program.run("--vary", "problem.n=40", "--vary", "physics.alpha=0.5,1.0",
+                               "-o", killed_sweep.path)  # fmt: skip
     assert again.exit_code == 0
     assert "2 of 2 points are done already" in again.stderr
-    assert killed.done() == before
-    assert len(SweepDirectory(killed.path).plan().points) == 12
+    assert killed_sweep.done() == before
+    assert len(SweepDirectory(killed_sweep.path).plan().points) == 12
 
 
 @pytest.mark.slow
-def test_a_failed_point_is_told_and_the_rest_go_on(program, tmp_path):
+def test_failed_point_is_reported_and_others_continue(program, tmp_path):
     arguments = ("--vary", "physics.eta=1.6,5e4", "--vary", "physics.max_energy_drift=0.02,1e-15",
                  "--set", "time.end=0.002", "-o", tmp_path / "sweep")  # fmt: skip
     result = program.run(*arguments)
@@ -99,7 +99,7 @@ def test_a_failed_point_is_told_and_the_rest_go_on(program, tmp_path):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM], ids=lambda one: one.name)
-def test_a_signal_stops_the_runs_with_a_checkpoint(number, program, tmp_path):
+def test_signal_stops_runs_with_checkpoint(number, program, tmp_path):
     path = tmp_path / "sweep"
     arguments = ("--vary", "problem.n=40,50,60", "--set", "time.end=4.0", "--jobs", "2", "-o", path)
     process = program.started(*arguments)
@@ -124,7 +124,7 @@ def test_a_signal_stops_the_runs_with_a_checkpoint(number, program, tmp_path):
 
 
 @pytest.mark.slow
-def test_a_second_interrupt_ends_the_runs_at_once(program, tmp_path):
+def test_second_interrupt_ends_runs_at_once(program, tmp_path):
     path = tmp_path / "sweep"
     # enough particles for the initial state to take longer than two signals
     process = program.started("--vary", "problem.n=400000", "--jobs", "1", "-o", path)
@@ -139,7 +139,7 @@ def test_a_second_interrupt_ends_the_runs_at_once(program, tmp_path):
     assert not list(path.glob("*/checkpoints/*.h5"))
 
 
-def test_nobody_runs_a_point_that_another_process_is_at(program):
+def test_point_running_in_other_process_is_skipped(program):
     (task,) = prepared(program, "problem.n=40")
     with task.log.open("ab") as held:
         fcntl.flock(held, fcntl.LOCK_EX)
@@ -166,7 +166,7 @@ def test_nobody_runs_a_point_that_another_process_is_at(program):
 
 
 @pytest.mark.slow
-def test_an_orphan_keeps_its_lock(program, tmp_path):
+def test_orphaned_run_keeps_its_lock(program, tmp_path):
     path = tmp_path / "sweep"
     process = program.started("--vary", "problem.n=40", "--set", "time.end=2.0", "-o", path)
     until(lambda: (path / "problem.n=40" / "checkpoints" / "checkpoint_000000.h5").exists())
@@ -179,7 +179,7 @@ def test_an_orphan_keeps_its_lock(program, tmp_path):
     assert attempts(path, "problem.n=40") == ["run"]
 
 
-def test_threads_are_shared_out(program, monkeypatch):
+def test_threads_are_divided_among_jobs(program, monkeypatch):
     from sph.sweep import local
 
     found = prepared(program, "problem.n=40:80:+10")
@@ -197,7 +197,7 @@ def test_threads_are_shared_out(program, monkeypatch):
 
 
 @pytest.mark.slow
-def test_the_last_lines_of_a_run_without_a_message_are_the_reason(program, monkeypatch):
+def test_failed_run_without_message_gives_last_lines_as_reason(program, monkeypatch):
     (task,) = prepared(program, "problem.n=40")
     # a file where the run directory should be
     Path(task.run.path).write_text("")
@@ -210,11 +210,11 @@ def test_the_last_lines_of_a_run_without_a_message_are_the_reason(program, monke
     assert not task.failure.exists()
 
 
-def test_processors():
+def test_available_processors_within_machine():
     assert 1 <= available_processors() <= os.cpu_count()
 
 
-def test_a_sweep_says_how_many_points_it_has_and_above_a_bound_asks(program, tmp_path, monkeypatch):
+def test_sweep_reports_number_of_points_and_asks_above_bound(program, tmp_path, monkeypatch):
     ran = []
     monkeypatch.setattr(command.local, "run", lambda tasks, jobs, tell: ran.append(len(tasks)))
     monkeypatch.setattr(command, "ASKED_ABOVE", 2)
@@ -231,7 +231,7 @@ def test_a_sweep_says_how_many_points_it_has_and_above_a_bound_asks(program, tmp
 
 
 @pytest.mark.slow
-def test_what_the_file_system_refuses_for_a_point_is_its_reason(program, tmp_path):
+def test_file_system_error_of_point_is_its_reason(program, tmp_path):
     path = tmp_path / "a path/sweep"
     (path.parent).mkdir()
     result = program.run("--vary", "problem.n=40", "-o", path)

@@ -35,7 +35,7 @@ def files(directory):
     return {path: path.read_bytes() for path in directory.rglob("*") if path.is_file()}
 
 
-def test_the_manifest_is_the_plan(config, sweep):
+def test_manifest_equals_plan(config, sweep):
     plan = of("problem.n=40,50", "physics.alpha={min = 0.1, max = 2.0},1.0",
               overrides=["physics.kernel=cubic_spline"])  # fmt: skip
     sweep.prepare(config, plan)
@@ -45,13 +45,13 @@ def test_the_manifest_is_the_plan(config, sweep):
     assert sweep.plan() == plan
 
 
-def test_values_may_be_added(config, sweep):
+def test_values_can_be_added(config, sweep):
     sweep.prepare(config, of("problem.n=40,50"))
     sweep.prepare(config, of("problem.n=60"))
     assert sweep.plan() == of("problem.n=40,50,60")
 
 
-def test_the_same_configuration_may_be_given_in_another_way(config, sweep):
+def test_equal_configuration_from_other_source_is_accepted(config, sweep):
     sweep.prepare(config, of("problem.n=50,60"))
     config.write_text("# as before\n" + TUBE.replace("n = 40", "n = 70"))
     # n is varied, the rest are defaults, and threads change no result
@@ -60,47 +60,47 @@ def test_the_same_configuration_may_be_given_in_another_way(config, sweep):
 
 
 @pytest.mark.parametrize(
-    ("plan", "words"),
+    ("plan", "keys"),
     [
-        (of("problem.n=50", overrides=["physics.C=0.3"]), "physics.C = 0.15 there, 0.3 now"),
-        (of("problem.n=90", overrides=["physics.C=0.3"]), "physics.C = 0.15 there, 0.3 now"),
-        (of("physics.alpha=1.0"), "over problem.n, not over physics.alpha"),
+        (of("problem.n=50", overrides=["physics.C=0.3"]), ["physics.C"]),
+        (of("problem.n=90", overrides=["physics.C=0.3"]), ["physics.C"]),
+        (of("physics.alpha=1.0"), ["problem.n", "physics.alpha"]),
     ],
 )
-def test_another_sweep_in_the_same_directory_is_refused(plan, words, config, sweep):
+def test_other_sweep_in_directory_is_refused(messages, plan, keys, config, sweep):
     sweep.prepare(config, of("problem.n=50,60"))
     before = files(sweep.path)
-    with pytest.raises(ConfigError, match=f"(?s){words}.*Try: another directory"):
+    with messages.raised(ConfigError, *keys, "Try: "):
         sweep.prepare(config, plan)
     assert files(sweep.path) == before
 
 
-def test_a_changed_file_is_refused(config, sweep):
+def test_changed_configuration_file_is_refused(messages, config, sweep):
     sweep.prepare(config, of("problem.n=50"))
     config.write_text(TUBE + "[physics]\nbalsara = false\n")
-    with pytest.raises(ConfigError, match=r"physics\.balsara = True there, False now"):
+    with messages.raised(ConfigError, "physics.balsara"):
         sweep.prepare(config, of("problem.n=50"))
 
 
-def test_a_run_of_something_else_in_a_points_place_is_refused(config, sweep):
+def test_other_run_in_place_of_point_is_refused(messages, config, sweep):
     sweep.prepare(config, of("problem.n=50"))
     run = RunDirectory.create(sweep.path / "problem.n=50")
     other = configuration.load(config, ["problem.n=50", "time.end=0.3"])
     run.write_config(other.to_toml())
     run.write_summary({"status": "done"})
-    with pytest.raises(ConfigError, match=r"time\.end = 0.3 there, 0.2 now"):
+    with messages.raised(ConfigError, "time.end"):
         sweep.prepare(config, of("problem.n=50"))
 
 
-def test_a_directory_of_something_else_is_refused(config, tmp_path):
+def test_directory_of_other_files_is_refused(messages, config, tmp_path):
     (tmp_path / "mine").mkdir()
     (tmp_path / "mine" / "letter.txt").touch()
     for path in (tmp_path / "mine", config):
-        with pytest.raises(FileError, match="not the directory of a sweep"):
+        with messages.raised(FileError):
             SweepDirectory(path).prepare(config, of("problem.n=50"))
 
 
-def test_a_wrong_point_makes_no_directory(config, sweep):
+def test_invalid_point_creates_no_directory(config, sweep):
     with pytest.raises(ConfigError):
         sweep.prepare(config, of("problem.n=50,-1"))
     assert not sweep.path.exists()
@@ -110,14 +110,14 @@ def test_a_wrong_point_makes_no_directory(config, sweep):
     "", "points = 1", "[[", 'set = "x"\n[vary]\n[points]', "set = []\n[vary]\nx = 1\n[points]",
     "set = []\n[vary]\n[points]\na = [1]", "a = " + "[" * 5000,
 ])  # fmt: skip
-def test_what_is_no_manifest(text, config, sweep):
+def test_invalid_manifest_is_refused(messages, text, config, sweep):
     sweep.prepare(config, of("problem.n=50"))
     sweep.manifest.write_text(text)
-    with pytest.raises(FileError, match="is not the manifest of a sweep"):
+    with messages.raised(FileError):
         sweep.prepare(config, of("problem.n=50"))
 
 
-def test_a_reason_that_is_not_text_is_told_as_far_as_it_is(config, sweep):
+def test_reason_not_text_is_shown_as_far_as_possible(config, sweep):
     plan = of("problem.n=50,60,70,80")
     sweep.prepare(config, plan)
     names = [point.name for point in plan.points]
@@ -135,18 +135,18 @@ def test_a_reason_that_is_not_text_is_told_as_far_as_it_is(config, sweep):
     assert standings[0].reason == found[names[0]]
 
 
-def test_a_pipe_in_a_received_sweep_is_not_waited_for(config, sweep):
+def test_pipe_in_sweep_directory_is_not_waited_for(messages, config, sweep):
     sweep.prepare(config, of("problem.n=50"))
     sweep.base.unlink()
     os.mkfifo(sweep.base)
-    with pytest.raises(FileError, match=r"base.toml is not a regular file.\nTry: "):
+    with messages.raised(FileError, "base.toml"):
         sweep.prepare(config, of("problem.n=50"))
 
 
 @pytest.mark.parametrize(
     "text", ["[" * 100_000, "[]", '{"status": "done", "warnings": 5}', '{"warnings": [1, {}]}']
 )
-def test_a_point_with_a_damaged_summary_has_a_standing(config, sweep, text):
+def test_point_with_damaged_summary_has_status(config, sweep, text):
     plan = of("problem.n=50")
     sweep.prepare(config, plan)
     (task,) = tasks(sweep, plan)
@@ -157,7 +157,7 @@ def test_a_point_with_a_damaged_summary_has_a_standing(config, sweep, text):
 
 
 @pytest.mark.parametrize("has_base", [False, True])
-def test_a_sweep_killed_while_preparing_is_taken_over(config, sweep, has_base):
+def test_sweep_killed_while_preparing_can_be_run_again(config, sweep, has_base):
     sweep.logs.mkdir(parents=True)
     (sweep.path / ".base.toml.0123.partial").touch()
     if has_base:
@@ -167,24 +167,24 @@ def test_a_sweep_killed_while_preparing_is_taken_over(config, sweep, has_base):
 
 
 @pytest.mark.parametrize("there", ["logs/notes.txt", "notes.txt", "base.toml"])
-def test_what_is_more_than_a_killed_sweep_leaves_is_refused(config, sweep, there):
+def test_directory_with_foreign_files_after_kill_is_refused(messages, config, sweep, there):
     sweep.logs.mkdir(parents=True)
     (sweep.path / there).write_text("[problem]\n")
     before = files(sweep.path)
-    with pytest.raises(FileError, match="not the directory of a sweep"):
+    with messages.raised(FileError):
         sweep.prepare(config, of("problem.n=40,50"))
     assert files(sweep.path) == before
 
 
-def test_logs_that_are_a_link_are_refused(config, sweep, tmp_path):
+def test_logs_directory_link_is_refused(messages, config, sweep, tmp_path):
     sweep.prepare(config, of("problem.n=40,50"))
     sweep.logs.rename(tmp_path / "elsewhere")
     sweep.logs.symlink_to(tmp_path / "elsewhere")
-    with pytest.raises(FileError, match="logs is a symbolic link"):
+    with messages.raised(FileError):
         sweep.prepare(config, of("problem.n=40,50"))
 
 
-def test_a_log_that_is_a_link_is_not_written_through(config, sweep, tmp_path):
+def test_log_link_is_not_written_through(config, sweep, tmp_path):
     sweep.prepare(config, of("problem.n=40"))
     (tmp_path / "mine").write_text("precious")
     (task,) = tasks(sweep, sweep.plan())
@@ -194,7 +194,7 @@ def test_a_log_that_is_a_link_is_not_written_through(config, sweep, tmp_path):
     assert (tmp_path / "mine").read_text() == "precious"
 
 
-def test_a_point_whose_checkpoint_cannot_be_judged_is_not_run_anew(config, sweep):
+def test_point_with_unreadable_checkpoint_is_not_restarted_from_scratch(config, sweep):
     """It would replace what a newer version may have written."""
     sweep.prepare(config, of("problem.n=40"))
     (task,) = tasks(sweep, sweep.plan())

@@ -23,7 +23,7 @@ TUBE = '[problem]\nname = "shock_tube"\n'
          ["wendland_c2", "{name = 'cubic_spline', flattened = true}"]),
     ],
 )  # fmt: skip
-def test_values_are_split_at_commas_outside_of_brackets_and_quotes(text, parts):
+def test_values_split_at_commas_outside_brackets_and_quotes(text, parts):
     assert split(text) == parts
 
 
@@ -53,7 +53,7 @@ def test_values_are_split_at_commas_outside_of_brackets_and_quotes(text, parts):
         ("\u0661:\u0663:+\u0661", ["\u0661:\u0663:+\u0661"]),  # digits, but not TOML's
     ],
 )
-def test_ranges_include_their_last_value_within_rounding(text, values):
+def test_range_includes_last_value_within_rounding(text, values):
     assert expand(text) == values
 
 
@@ -63,12 +63,12 @@ def test_ranges_include_their_last_value_within_rounding(text, values):
      "1e400:1e400:x2", "1:1e400:+1", "1:2:+1e400", "1e-400:1:x10", "1:1e12:+1", "1:2:x1.0000001",
      "1:2:x1.00000000000000000001", "1:" + "9" * 400 + ":x10", "1:10001:+1"],
 )  # fmt: skip
-def test_ranges_that_lead_nowhere(text):
-    with pytest.raises(ConfigError, match=re.escape(text)):
+def test_endless_or_empty_range_is_refused(messages, text):
+    with messages.raised(ConfigError, text):
         expand(text)
 
 
-def test_the_product_runs_the_last_key_fastest_and_has_readable_names():
+def test_product_varies_last_key_fastest_with_readable_names():
     plan = Plan.of(["problem.n=100,200", "physics.alpha=1.0,2.0"], ["physics.C=0.3"])
     assert [point.name for point in plan.points] == [
         "problem.n=100,physics.alpha=1.0",
@@ -80,7 +80,7 @@ def test_the_product_runs_the_last_key_fastest_and_has_readable_names():
     assert plan.overrides == ("physics.C=0.3",)
 
 
-def test_names_are_safe_short_and_different():
+def test_point_names_are_safe_short_and_unique():
     plan = Plan.of(["physics.alpha={min = 0.1, max = 2.0},1.0", "a.b=x/y,x_y,x y,X/Y"])
     names = [point.name for point in plan.points]
     assert names[0].startswith("physics.alpha=min=0.1,max=2.0,a.b=x_y-")
@@ -94,26 +94,27 @@ def test_names_are_safe_short_and_different():
 
 
 @pytest.mark.parametrize(
-    ("varies", "words"),
+    "varies",
     [
-        (["problem.n"], "expected TABLE.KEY=VALUE"),
-        (["n=1,2"], "expected TABLE.KEY=VALUE"),
-        (["problem.n="], "a value is empty"),
-        (["problem.n=1,,2"], "a value is empty"),
-        (["problem.n=1,2,1"], "1 is given twice"),
-        (["problem.n=100:400:x2,200"], "200 is given twice"),
-        (["problem.n=1", "problem.n=2"], "problem.n is varied already"),
-        (["problem.n=1", "problem . n=2"], "problem.n is varied already"),
-        (["problem.n=1:9000:+1", "physics.C=1:9000:+1"], "81,000,000 points"),
-        (["problem. =1"], "expected TABLE.KEY=VALUE"),
+        ["problem.n"],
+        ["n=1,2"],
+        ["problem.n="],
+        ["problem.n=1,,2"],
+        ["problem.n=1,2,1"],
+        ["problem.n=100:400:x2,200"],
+        ["problem.n=1", "problem.n=2"],
+        ["problem.n=1", "problem . n=2"],
+        ["problem.n=1:9000:+1", "physics.C=1:9000:+1"],
+        ["problem. =1"],
     ],
+    ids=" ".join,
 )
-def test_what_cannot_be_varied(varies, words):
-    with pytest.raises(ConfigError, match=re.escape(words)):
+def test_vary_unsuitable_key_is_refused(messages, varies):
+    with messages.raised(ConfigError, "--vary"):
         Plan.of(varies)
 
 
-def test_all_points_are_resolved(tmp_path):
+def test_every_point_is_resolved(tmp_path):
     (tmp_path / "tube.toml").write_text(TUBE)
     plan = Plan.of(["physics.kernel=cubic_spline,wendland_c2"], ["problem.n=50"])
     found = plan.resolved(tmp_path / "tube.toml")
@@ -121,7 +122,7 @@ def test_all_points_are_resolved(tmp_path):
     assert found["physics.kernel=wendland_c2"].physics.kernel == "wendland_c2"
 
 
-def test_all_that_is_wrong_is_told_once_in_the_users_words(tmp_path):
+def test_each_error_reported_once_in_user_terms(tmp_path):
     (tmp_path / "tube.toml").write_text(TUBE)
     plan = Plan.of(["problem.n=100,x,200", "physics.alpha=1.0,-1.0"], ["physics.C=-2"])
     with pytest.raises(ConfigError) as told:
@@ -132,26 +133,26 @@ def test_all_that_is_wrong_is_told_once_in_the_users_words(tmp_path):
     assert starts == {"--set physics.C=-2", "--vary problem.n=x", "--vary physics.alpha=-1.0"}
 
 
-def test_what_is_wrong_only_together_names_the_point(tmp_path):
+def test_error_of_combination_names_point(messages, tmp_path):
     (tmp_path / "tube.toml").write_text(TUBE)
     plan = Plan.of(["problem.dimension=1,2", "problem.lattice=cubic,hexagonal"])
-    with pytest.raises(ConfigError, match=r"dimension=1,problem\.lattice=hexagonal|--vary"):
+    with messages.raised(ConfigError, "problem.lattice"):
         plan.resolved(tmp_path / "tube.toml")
 
 
 @pytest.mark.parametrize("override", ["physics.alpha=1.0", "physics . alpha.min=0.1"])
-def test_a_key_that_is_set_too_is_refused(override):
-    with pytest.raises(ConfigError, match=r"physics\.alpha is varied"):
+def test_vary_key_also_set_is_refused(messages, override):
+    with messages.raised(ConfigError, "physics.alpha"):
         Plan.of(["physics.alpha=0.5,1.0"], [override])
 
 
-def test_two_points_of_one_configuration_are_refused(tmp_path):
+def test_two_points_with_equal_configuration_are_refused(messages, tmp_path):
     (tmp_path / "tube.toml").write_text(TUBE)
-    with pytest.raises(ConfigError, match=r"alpha=0\.5 and physics\.alpha=0\.50 are the same"):
+    with messages.raised(ConfigError, "physics.alpha"):
         Plan.of(["physics.alpha=0.5,0.50"]).resolved(tmp_path / "tube.toml")
 
 
-def test_text_that_is_not_utf8_is_refused(tmp_path):
+def test_vary_text_not_utf8_is_refused(messages, tmp_path):
     (tmp_path / "tube.toml").write_text(TUBE)
-    with pytest.raises(ConfigError, match="expected UTF-8 text"):
+    with messages.raised(ConfigError):
         Plan.of(["physics.kernel=wendland_c2,\udcff"]).resolved(tmp_path / "tube.toml")

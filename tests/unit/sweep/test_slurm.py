@@ -22,7 +22,7 @@ def job_of(run):
 
 
 @pytest.mark.slow
-def test_a_job_that_comes_to_its_limit_goes_on_by_restart(program, tmp_path):
+def test_job_at_time_limit_continues_by_restart(program, tmp_path):
     arguments = ("--vary", "problem.n=40", "--set", "time.end=1.0")
     path = tmp_path / "sweep"
     process = program.started(*arguments, "--slurm", "cluster=local", "--slurm", "timeout_min=5",
@@ -39,14 +39,14 @@ def test_a_job_that_comes_to_its_limit_goes_on_by_restart(program, tmp_path):
 
 
 @pytest.mark.slow
-def test_a_job_that_fails_is_told(program, tmp_path):
+def test_failed_job_is_reported(program, tmp_path):
     result = program.run("--vary", "physics.eta=5e4", "--slurm", "cluster=local", "-o",
                          tmp_path / "sweep")  # fmt: skip
     assert result.exit_code == 3, result.output
     assert "physics.eta=5e4: particle" in result.stderr
 
 
-def test_options():
+def test_slurm_options_are_parsed():
     found = slurm._read(["timeout_min=60", "partition=short", "cpus_per_task=4"])
     assert found == {"timeout_min": 60, "partition": "short", "cpus_per_task": 4}
 
@@ -60,7 +60,7 @@ def test_options():
         ("cluster=nowhere", "nowhere"),
     ],
 )
-def test_wrong_options(option, words, program, tmp_path):
+def test_slurm_option_invalid_is_refused(option, words, program, tmp_path):
     local = [] if option.startswith("cluster") else ["--slurm", "cluster=local"]
     result = program.run("--vary", "problem.n=40", "-o", tmp_path / "sweep", "--slurm", option,
                          *local)  # fmt: skip
@@ -69,7 +69,7 @@ def test_wrong_options(option, words, program, tmp_path):
     assert words in result.stderr
 
 
-def test_one_place_to_run(program, tmp_path):
+def test_slurm_with_scheduler_is_refused(program, tmp_path):
     places = ("--slurm", "timeout_min=5", "--scheduler", "tcp://127.0.0.1:9")
     result = program.run("--vary", "problem.n=40", "-o", tmp_path / "sweep", *places)
     assert result.exit_code == 2

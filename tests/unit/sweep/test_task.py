@@ -25,8 +25,8 @@ def task(tmp_path):
 
 
 @pytest.fixture
-def ends(task, monkeypatch):
-    """ends(code, summary, words): the outcome of a run that ends with that."""
+def outcome_of(task, monkeypatch):
+    """outcome_of(code, summary, words): the outcome of a run that ends with that."""
 
     def executed(code, summary=None, words=""):
         lines = f"import sys; sys.stderr.write({words!r}); "
@@ -46,52 +46,52 @@ WARNED = {"status": "done", "warnings": [{"kind": "paired"}, {"kind": "limit"}, 
 FAILED = {"status": "failed", "reason": "step 3: no.\nTry: more."}
 
 
-def test_a_run_that_is_done_is_told_with_its_warnings(ends, task):
-    found = ends(0, WARNED)
+def test_finished_run_reported_with_warnings(outcome_of, task):
+    found = outcome_of(0, WARNED)
     assert found == (task.point.name, "done", "", "restart", 0, ("paired", "limit"))
     again = (task.point.name, "done", "", "", 0, ("paired", "limit"))
     assert execute(task) == standing(task) == again  # nothing is done a second time
 
 
-def test_a_run_that_leaves_no_summary_is_not_done(ends, task):
-    found = ends(0, words="it went\nwell\n")
+def test_run_without_summary_is_failed(outcome_of, task):
+    found = outcome_of(0, words="it went\nwell\n")
     assert (found.status, found.reason) == ("failed", "exit code 0: well")
 
 
 @pytest.mark.parametrize(
     ("code", "words"), [(75, "stopped, with a checkpoint"), (-9, "ended by signal 9")]
 )
-def test_a_run_that_was_stopped_has_not_failed(ends, task, code, words):
-    found = ends(code, words="sph: something")
+def test_stopped_run_is_not_failed(outcome_of, task, code, words):
+    found = outcome_of(code, words="sph: something")
     assert found == (task.point.name, "stopped", words, "restart", 0, ())
     assert not task.failure.exists()
     assert standing(task).status == "stopped"
 
 
-def test_a_run_that_failed_is_told_in_its_own_words(ends, task):
-    found = ends(3, FAILED, "sph: other words\n")
+def test_failed_run_reported_with_its_reason(outcome_of, task):
+    found = outcome_of(3, FAILED, "sph: other words\n")
     reason = FAILED["reason"]
     assert found == (task.point.name, "failed", reason, "restart", 3, ())
     assert standing(task) == (task.point.name, "failed", reason, "", 0, ())
 
 
-def test_the_reason_is_of_this_attempt_and_not_of_an_earlier_one(ends, task):
-    assert ends(4, words="sph: first\n").reason == "first"
-    assert ends(4, words="nothing told\nlast\n").reason == "exit code 4: last"
+def test_reason_is_from_this_attempt(outcome_of, task):
+    assert outcome_of(4, words="sph: first\n").reason == "first"
+    assert outcome_of(4, words="nothing told\nlast\n").reason == "exit code 4: last"
     assert task.failure.read_text() == "exit code 4: last\n"
     # an old summary says nothing of another end
-    assert ends(4, FAILED, "sph: third\n").reason == "third"
-    assert ends(75).status == "stopped"
+    assert outcome_of(4, FAILED, "sph: third\n").reason == "third"
+    assert outcome_of(75).status == "stopped"
     assert not task.failure.exists()
 
 
-def test_an_error_of_ours_has_its_exit_code(task):
+def test_error_of_sweep_has_its_exit_code(task):
     task.sweep.manifest.unlink()
     found = execute(task)
     assert (found.status, found.code) == ("failed", 4)
 
 
-def test_a_points_settings_come_after_those_of_all_points(task):
+def test_point_settings_follow_common_settings(task):
     command = task.command()
     sets = [command[i + 1] for i, part in enumerate(command) if part == "--set"]
     assert sets == ["physics.alpha=0.5", "physics.C=0.1"]
@@ -102,7 +102,7 @@ def test_a_points_settings_come_after_those_of_all_points(task):
 @pytest.mark.parametrize(
     ("status", "how"), [("stopped", "restart"), (None, "restart"), ("failed", "run")]
 )
-def test_a_run_that_failed_begins_anew_and_any_other_goes_on(task, monkeypatch, status, how):
+def test_failed_run_starts_again_and_others_restart(task, monkeypatch, status, how):
     run = RunDirectory.create(task.run.path)
     run.config.write_text("")
     if status:
@@ -112,7 +112,7 @@ def test_a_run_that_failed_begins_anew_and_any_other_goes_on(task, monkeypatch, 
     assert task.command()[3] == how
 
 
-def test_threads_may_be_chosen_for_all_points_or_for_one(task):
+def test_threads_set_for_all_points_or_one(task):
     assert not chooses_threads(task)
     by_all = Task(task.sweep, task.point, ("run.threads=2",))
     by_one = Task(task.sweep, replace(task.point, settings=("run.threads=2",)), ())

@@ -1,4 +1,4 @@
-"""Schemes, one file each: the force and the work between a pair of particles.
+"""Schemes, one file each: the force and the heating between a pair of particles.
 
 A scheme is a NamedTuple with the method
 
@@ -12,9 +12,9 @@ A scheme whose pressure is itself a sum over neighbours has the class attribute 
 
     summed_terms(eos, energy, density_of_energy, slope)    (pressure, factor, energy_shift)
 
-of a particle, from density_of_energy, the sum of m_j u_j W_ij(H_i), and slope, its H/D d/dH over
-Omega rho. The terms of a pair are then factor_i (u_j - energy_shift_i) and
-factor_j (u_i - energy_shift_j).
+of a particle. density_of_energy is the sum E_i of m_j u_j W_ij(H_i), and slope is
+(H_i/D) (dE_i/dH_i) / (Omega_i rho_i). The terms of a pair are then
+factor_i (u_j - energy_shift_i) and factor_j (u_i - energy_shift_j).
 """
 
 from sph import registry

@@ -1,4 +1,4 @@
-"""Grad-h SPH with the averaged kernel gradient: eqs 22-23."""
+"""Grad-h SPH with the average of both kernel gradients (eqs 22-23)."""
 
 from typing import NamedTuple
 

@@ -1,7 +1,8 @@
-"""Density-independent SPH in pressure-energy form (Hopkins 2013, eqs 21-22; Saitoh & Makino 2013).
+"""Density-independent SPH in pressure-energy form (Hopkins 2013; Saitoh & Makino 2013).
 
-The pressure is a sum over neighbours, P_i = (gamma - 1) sum m_j u_j W_ij(H_i), so it is smooth
-across a contact for any jump of density. With grad W_i for grad_i W_ij(H_i),
+The pressure is a sum over neighbours, P_i = (gamma - 1) sum m_j u_j W_ij(H_i). The pressure is
+therefore smooth across a contact for any jump of density. With grad W_i for grad_i W_ij(H_i),
+Hopkins' eqs 21-22 are
 
     dv_i/dt = -sum m_j (gamma - 1)^2 u_i u_j [f_ij/P_i grad W_i + f_ji/P_j grad W_j]
     du_i/dt = sum m_j (gamma - 1)^2 u_i u_j f_ij/P_i v_ij . grad W_i
@@ -20,7 +21,7 @@ from sph.model import model
 
 @model(Scheme)
 class PressureEnergy(NamedTuple):
-    """Only for ideal gases: no surface tension at contacts, but noise at very large jumps of u."""
+    """Only for ideal gases. No surface tension at contacts, but noise at very large jumps of u."""
 
     sums_pressure = True
     pair = Variational.pair

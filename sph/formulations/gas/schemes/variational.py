@@ -1,6 +1,8 @@
-"""Grad-h SPH from a Lagrangian: each pressure with its own kernel (Springel & Hernquist 2002).
+"""Grad-h SPH from a Lagrangian, with both kernel gradients (Springel & Hernquist 2002).
 
-Their eq 7: dv_i/dt = -sum m_j [P_i/(Omega_i rho_i^2) grad W_i + P_j/(Omega_j rho_j^2) grad W_j].
+Each pressure is multiplied by the kernel gradient of the same particle, their eq 7:
+
+    dv_i/dt = -sum m_j [P_i/(Omega_i rho_i^2) grad W_i + P_j/(Omega_j rho_j^2) grad W_j].
 """
 
 from typing import NamedTuple

@@ -1,1 +1,1 @@
-"""Viscosity switches, one file each: alpha of a particle rises in shocks and decays afterwards."""
+"""Viscosity switches, one file each: alpha of a particle rises in shocks and decays later."""

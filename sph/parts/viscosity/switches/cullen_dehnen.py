@@ -1,6 +1,7 @@
-"""Alpha rises where compression increases, ahead of a shock (Cullen & Dehnen 2010).
+"""Alpha rises ahead of a shock, where compression increases (Cullen & Dehnen 2010).
 
-Their h is the support radius, here H. Their alpha decays to 0, here it decays to `min`.
+The h of Cullen & Dehnen is the support radius, here H. Their alpha decays to 0; here alpha decays
+to `min`.
 """
 
 from typing import Annotated, NamedTuple

@@ -1,6 +1,6 @@
-"""Alpha rises with the compression of the flow and decays behind it.
+"""Alpha rises in compression and decays elsewhere (Morris & Monaghan 1997).
 
-Eqs 6, 27, 28, 31 (Morris & Monaghan 1997; the source term as in Rosswog et al. 2000).
+Eqs 6, 27, 28 and 31, with the source term of Rosswog et al. (2000).
 """
 
 from typing import Annotated, NamedTuple

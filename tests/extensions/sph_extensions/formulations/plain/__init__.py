@@ -107,7 +107,7 @@ class Plain(Formulation):
         ratio = kernels.support_ratio(kernel, scene.dimension)
         self.fields = (*COMMON, Field("pressure", stored=False))
         self.eos = scene.eos
-        self.models = self.starting_models = Models(
+        self.models = Models(
             kernel, scene.eos, float(scene.physics.plain_alpha), ratio, float(scene.physics.eta)
         )
         gas = ("position", "mass", "predicted_energy", "support")
