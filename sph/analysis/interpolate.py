@@ -8,7 +8,6 @@ from typing import NamedTuple
 
 import numpy as np
 from numba import njit
-from scipy.spatial import cKDTree
 
 from sph.compiled import COMPILED
 from sph.domain import Domain
@@ -48,6 +47,8 @@ def at_points(
 
     Vectors of images behind a mirror are reflected.
     """
+    from scipy.spatial import cKDTree  # costs 0.2 s to import, which most runs do not need
+
     D, H, weight = particles.dimension, particles.support, _weight(particles)
     tree = cKDTree(points.T)
     low, high = points.min(axis=1), points.max(axis=1)

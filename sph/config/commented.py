@@ -8,7 +8,8 @@ from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
 from sph.config import restarts
-from sph.config.errors import branches, describe, field_annotation
+from sph.config.choices import ModelChoice
+from sph.config.errors import branches, choice_of, describe, field_annotation
 from sph.config.toml_text import value_text
 from sph.docstrings import docstring
 from sph.problems.base import Section
@@ -54,14 +55,21 @@ def _key(key: str, field: FieldInfo, sentence: str, value: Any, restart: str) ->
 
 
 def _entries(branch: Any) -> str:
-    """Return a comment line for each key of an inline table, "" if the value is not a table."""
-    if not (isinstance(branch, type) and issubclass(branch, BaseModel)):
+    """Return a comment line for each key of an inline table, "" if the value is not a table.
+
+    For a table that names a model: the parameters of each model that has some.
+    """
+    if isinstance(choice := choice_of(branch), ModelChoice):
+        tables = {f"{name}: ": choice.parameters(name) for name in choice.valid_names()}
+    elif isinstance(branch, type) and issubclass(branch, BaseModel):
+        tables = {"": branch}
+    else:
         return ""
-    lines = (
-        f"  {key}: {field.description or key}, {describe(field_annotation(field))}"
-        for key, field in branch.model_fields.items()
+    return "".join(
+        _comment(f"  {of}{key}: {field.description or key}, {describe(field_annotation(field))}")
+        for of, table in tables.items()
+        for key, field in table.model_fields.items()
     )
-    return "".join(_comment(line) for line in lines)
 
 
 def _line(key: str, field: FieldInfo, value: Any) -> str:

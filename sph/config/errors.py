@@ -100,6 +100,11 @@ def branches(annotation: Any) -> list[Any]:
     return [Annotated[(one, *said)] if said else one for one in some]
 
 
+def choice_of(annotation: Any) -> Any:
+    """Return the `sph.config.choices.Choice` that annotates a key, or None."""
+    return _choice(_plain(annotation)[1])
+
+
 def _choice(said: list[Any]) -> Any:
     return next((one for one in said if hasattr(one, "valid_names")), None)
 

@@ -4,6 +4,7 @@ import copy
 
 import numpy as np
 import pytest
+from marks import slow_except
 from outcome import CONFIGS, simulate
 
 from sph import config as configuration
@@ -23,8 +24,10 @@ def load(stem, *overrides):
 @pytest.mark.parametrize(
     "override",
     [f"scheme='{name}'" for name in SCHEMES]
-    + [f"conductivity='{name}'" for name in CONDUCTIVITIES]
-    + [f"conductivity={{name='{name}', switched=true}}" for name in CONDUCTIVITIES],
+    + slow_except((), [f"conductivity='{name}'" for name in CONDUCTIVITIES])
+    + slow_except(
+        {}, [f"conductivity={{name='{name}', switched=true}}" for name in CONDUCTIVITIES]
+    ),
 )
 def test_every_scheme_conserves_energy_and_solves_sod(override):
     outcome = simulate(load("sod", "problem.n=100", f"physics.{override}"))
@@ -48,6 +51,7 @@ def entropy_error(scheme, C):
     return np.abs(after / before - 1).max()
 
 
+@pytest.mark.slow
 def test_variational_scheme_conserves_entropy():
     grad_h, variational = (
         [entropy_error(scheme, C) for C in (0.04, 0.02)] for scheme in ("grad_h", "variational")
@@ -72,6 +76,7 @@ def test_switched_conductivity_smooths_contact_only():
     assert switched[0] - none[0] < (fixed[0] - none[0]) / 3
 
 
+@pytest.mark.slow
 def test_pressure_energy_scheme_keeps_contact_at_rest():
     grad_h, pressure_energy = (
         simulate(load("square", "problem.n=448", "time.end=1.0", f"physics.scheme='{scheme}'"))
@@ -107,6 +112,7 @@ def resumed(run, scheme, clock):
     )
 
 
+@pytest.mark.slow
 def test_restart_same_scheme_bit_for_bit_and_other_scheme_accepted():
     config = load("square", "problem.n=112", "physics.scheme='pressure_energy'")
     clock = Clock()

@@ -10,6 +10,7 @@ from typing import Any
 import dense
 import numpy as np
 import pytest
+from marks import slow_except
 
 from sph import config, passes, simulation
 from sph.clock import Clock
@@ -166,6 +167,9 @@ CASES = [
         alpha=SHOCKS,
     ),
 ]
+# Together, the cases without the mark `slow` have every scheme, three dimensions, every boundary,
+# every kind of alpha and of density, and conductivity with and without a switch.
+MARKED = slow_except({0, 8, 16, 17, 20, 24, 32}, CASES)
 
 
 @dataclass
@@ -300,7 +304,7 @@ def eager_order(monkeypatch):
 
 @pytest.mark.usefixtures("eager_order")
 @pytest.mark.parametrize("lists", ["fresh", "reused", "widened"])
-@pytest.mark.parametrize("case", CASES, ids=str)
+@pytest.mark.parametrize("case", MARKED, ids=str)
 def test_rates_match_dense_transcription(case, lists):
     scattered, skin = random_gas(case, lists)
     thinnest = np.diff(case.box).min()
@@ -332,7 +336,7 @@ def test_rates_match_dense_transcription(case, lists):
 
 @pytest.mark.usefixtures("eager_order")
 @pytest.mark.parametrize("lists", ["reused", "widened"])
-@pytest.mark.parametrize("case", CASES[::4], ids=str)
+@pytest.mark.parametrize("case", MARKED[::4], ids=str)
 def test_rates_two_threads_equal_one_bit_for_bit(case, lists):
     scattered, skin = random_gas(case, lists)
     _, one, _ = run_engine(case, scattered, skin, threads=1)
@@ -422,7 +426,10 @@ TRAJECTORIES = [
 ]
 
 
-@pytest.mark.parametrize(("case", "count", "end"), TRAJECTORIES, ids=str)
+SLOW_TRAJECTORIES = [pytest.param(*one, marks=pytest.mark.slow) for one in TRAJECTORIES[1:]]
+
+
+@pytest.mark.parametrize(("case", "count", "end"), [TRAJECTORIES[0], *SLOW_TRAJECTORIES], ids=str)
 def test_trajectories_match_dense_transcription(case, count, end, monkeypatch):
     gas = moving_gas(case.box, count)
     run, times = simulate(case, gas, end)

@@ -49,7 +49,8 @@ for name in registry.names("sph.problems"):
 import numpy as np
 from sph.problems.support import lattice
 lattice.fill(np.array([[0.0, 1.0]]), 10, "cubic")
-found["a lattice that is no glass"] = imported("scipy.spatial")
+import sph.runner
+found["a lattice that is no glass, and a run"] = imported("scipy.spatial")
 
 print(json.dumps(found))
 """

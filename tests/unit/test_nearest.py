@@ -96,7 +96,10 @@ def after(simulation, time):
     return simulation
 
 
-@pytest.mark.parametrize(("kernel", "pairs"), [("cubic_spline", True), ("wendland_c2", False)])
+@pytest.mark.parametrize(
+    ("kernel", "pairs"),
+    [pytest.param("cubic_spline", True, marks=pytest.mark.slow), ("wendland_c2", False)],
+)
 def test_pairing_kernel_is_reported(simulate, tmp_path, kernel, pairs):
     keys = (f"physics.kernel={kernel}", "physics.eta=2.2", "physics.allow_pairing=true")
     run = after(simulate(uniform(tmp_path, *keys)), 5.0)

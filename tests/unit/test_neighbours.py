@@ -372,7 +372,7 @@ def held(position, radius):
     return (squared < radius[:, None] ** 2).sum(axis=1)
 
 
-@pytest.mark.parametrize("dimension", [1, 2, 3])
+@pytest.mark.parametrize("dimension", [1, 2, pytest.param(3, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("factor", [0.1, 1.0, 100.0, 1e6])
 def test_trim_reduces_only_far_too_large_guesses(dimension, factor):
     position = positions("random", dimension, 3000)

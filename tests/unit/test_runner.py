@@ -12,6 +12,7 @@ from types import SimpleNamespace
 import h5py
 import numpy as np
 import pytest
+from marks import slow_except
 
 from sph import config as configuration
 from sph import restarting, runner
@@ -202,7 +203,7 @@ def files(directory):
     return {path: path.read_bytes() for path in sorted(directory.rglob("*")) if path.is_file()}
 
 
-@pytest.fixture(scope="module", params=SCENES)
+@pytest.fixture(scope="module", params=slow_except({0}, SCENES))
 def uninterrupted(request, tmp_path_factory):
     """A scene's text and its run to the end on one thread."""
     text = SCENES[request.param]
@@ -560,7 +561,7 @@ HEATED = TUBE + "[physics]\nheating = { name = 'relaxation', energy = 20.0, time
 
 @pytest.mark.parametrize(
     "text",
-    [ALONE, LIQUID, HEATED, PULLED],
+    slow_except({2}, [ALONE, LIQUID, HEATED, PULLED]),
     ids=["held support", "stiffened gas", "heating", "external field"],
 )
 def test_restart_of_rare_options_is_bit_for_bit(tmp_path, text):
@@ -632,7 +633,10 @@ def test_restart_without_budget_measures_energy_drift_by_history(tube, tmp_path)
 
 @pytest.mark.parametrize(
     ("before", "after", "evolves"),
-    [("morris_monaghan", "cullen_dehnen", False), ("cullen_dehnen", "morris_monaghan", True)],
+    [
+        ("cullen_dehnen", "morris_monaghan", True),
+        pytest.param("morris_monaghan", "cullen_dehnen", False, marks=pytest.mark.slow),
+    ],
 )
 def test_restart_with_other_viscosity_switch_is_accepted(tmp_path, before, after, evolves):
     def alpha(switch):
@@ -810,6 +814,7 @@ def test_energy_limit_of_restart_ignores_gas_without_energy(tmp_path):
     assert restarting._coming_step(limited, last) == pytest.approx(min(last.next_step, allowed))
 
 
+@pytest.mark.slow
 def test_failure_of_first_evaluation_writes_offender_and_needs_no_force(tmp_path):
     few = TUBE.replace("mirror", "periodic").replace("n = 60", "n = 18")
     few += "[physics]\neta = 5e4\n"

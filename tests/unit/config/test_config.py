@@ -6,6 +6,7 @@ import pytest
 
 from sph import config, registry
 from sph.errors import ConfigError, FileError
+from sph.model import parameters
 from sph.parts.viscosity import Viscosity, constant
 from sph.parts.viscosity.switches import cullen_dehnen, morris_monaghan
 from sph.scene import Scene
@@ -219,6 +220,15 @@ def test_run_table_may_be_omitted():
     text = found.to_toml(include_run=False)
     assert "[run]" not in text
     assert config.from_text(text) == found.override(["run.threads=all"])
+
+
+@pytest.mark.parametrize("folder", ["sph.kernels", "sph.eos", "sph.parts.external"])
+def test_template_models_list_their_parameters(folder):
+    text = config.template("shock_tube")
+    for name in registry.names(folder):
+        for key, (_, declared) in parameters(registry.model_class(folder, name)).items():
+            assert declared.help != key  # has a help text
+            assert f"#   {name}: {key}: {declared.help[:40]}" in text
 
 
 @pytest.mark.parametrize("problem", registry.names("sph.problems"))
