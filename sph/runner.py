@@ -85,7 +85,7 @@ def state_of(simulation: Simulation, lineage: tuple[str, ...] = ()) -> Checkpoin
     """Return the checkpoint of a simulation, even of one that failed at its start."""
     particles, limit = simulation.particles, simulation.limit
     origin = simulation.search.origin or Origin(particles.position, particles.support, 0.0)
-    return Checkpoint(
+    found = Checkpoint(
         particles=particles,
         time=simulation.time,
         step=simulation.step,
@@ -97,6 +97,8 @@ def state_of(simulation: Simulation, lineage: tuple[str, ...] = ()) -> Checkpoin
         lineage=lineage,
         budget=simulation.budget,
     )
+    found.scene = simulation.scene  # built already
+    return found
 
 
 def new_history(config: Config, simulation: Simulation, directory: RunDirectory) -> History:

@@ -59,6 +59,7 @@ def _entries(branch: Any) -> str:
 
     For a table that names a model: the parameters of each model that has some.
     """
+    tables: dict[str, type[BaseModel]]
     if isinstance(choice := choice_of(branch), ModelChoice):
         tables = {f"{name}: ": choice.parameters(name) for name in choice.valid_names()}
     elif isinstance(branch, type) and issubclass(branch, BaseModel):

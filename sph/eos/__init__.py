@@ -33,7 +33,7 @@ class Defaults(Model):
     lowest_energy: Callable[[Any], Any] | None = None
 
     @classmethod
-    def required(cls):
+    def required(cls) -> tuple[str, ...]:
         return "pressure", "sound_speed", "internal_energy"
 
 

@@ -45,7 +45,7 @@ class Defaults(Model):
     pairs_above: Mapping[int, float] = MappingProxyType({})
 
     @classmethod
-    def required(cls):
+    def required(cls) -> tuple[str, ...]:
         return "normalisation", "w", "dw_over_q", "force_over_q"
 
 
