@@ -19,7 +19,7 @@ from numba.core.dispatcher import Dispatcher
 
 import sph
 from sph import fingerprint
-from sph.compiled import COMPILED, FASTMATH, FLAGS, larger, smaller, verb
+from sph.compiled import COMPILED, FASTMATH, FLAGS, INLINED, larger, smaller, verb
 
 PACKAGE = Path(sph.__file__).parent
 
@@ -196,16 +196,18 @@ def test_source_hash_depends_on_contents_and_names(tmp_path, monkeypatch):
 def test_compiled_functions_share_their_flags_and_are_all_cached():
     found = dict(dispatchers())
     assert "sph.formulations.gas.rates.rates" in found
-    flags = {"nopython": True, "boundscheck": None} | COMPILED
+    plain = {"nopython": True, "boundscheck": None}
+    flags = plain | COMPILED
     del flags["cache"]
     # its products keep their order, whatever it is inlined into
     exact = found.pop("sph.formulations.gas.thermodynamics._over")
     assert exact.targetoptions == flags | {"fastmath": False, "forceinline": True}
     assert exact.py_func.__closure__ is None
     for name, function in found.items():
-        inlined = {"forceinline": True} if "forceinline" in function.targetoptions else {}
-        assert function.targetoptions == flags | inlined, name
-        assert function.stats.cache_path is not None, name
+        # what is always inlined is cached with its callers
+        inlined = "forceinline" in function.targetoptions
+        assert function.targetoptions == (plain | INLINED if inlined else flags), name
+        assert (function.stats.cache_path is None) == inlined, name
         # neither the cache nor its key sees through a function that is closed over
         assert function.py_func.__closure__ is None, name
     by_function = {}

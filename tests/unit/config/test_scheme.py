@@ -19,6 +19,12 @@ class LiquidOfATest(NamedTuple):
 
     def pressure(self, density, internal_energy):
         return self.stiffness * (density - 1.0)
+
+    def sound_speed(self, density, pressure):
+        return self.stiffness**0.5
+
+    def internal_energy(self, density, pressure):
+        return 0.0 * density
 """
 
 
