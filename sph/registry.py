@@ -108,13 +108,21 @@ def model(package: str, choice: str | dict[str, Any] | None, label: str = "name"
 
 
 def _places(package: str, folders: bool) -> dict[str, str]:
-    """Return the package of each choice; those of sph have precedence over extensions."""
+    """Return the package of each choice.
+
+    Raises DeclarationError if a choice of users has the name of one of sph.
+    """
     found: dict[str, str] = {}
     for place in (package, extensions.counterpart(package)):
         if not extensions.exists(place):
             continue
         for module in pkgutil.iter_modules(importlib.import_module(place).__path__):
             if (folders or not module.ispkg) and not module.name.startswith("_"):
-                found.setdefault(module.name, place)
+                if module.name in found:
+                    raise DeclarationError(
+                        f"{place}.{module.name}: {package} has a choice of this name; expected "
+                        "another name"
+                    )
+                found[module.name] = place
     found.pop("base", None)
     return found

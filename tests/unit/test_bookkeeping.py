@@ -60,7 +60,7 @@ def simulation():
         step=20, steps_here=15, time=0.25, limit=StepLimit(0.125, 17, "energy"), totals=TOTALS,
         energy_drift=-0.01, energy_injected=13.0, energy_added=14.0, held_supports=3,
         volume_ratio=0.97, columns=dict, list_builds=6, clock=Clock(), scene=scene,
-        team=SimpleNamespace(threads=2),
+        team=SimpleNamespace(threads=2), check_fields=lambda: None,
         particles=SimpleNamespace(
             number=100, position=np.ones((2, 4)), velocity=np.ones((2, 4)), mass=np.ones(4),
             density=np.ones(4),
@@ -238,11 +238,12 @@ def test_checkpoint_written_after_its_history_rows(session, simulation, monkeypa
     )
     monkeypatch.setattr(runner, "state_of", lambda *_: None)
     one.progress.wrote = lambda path, simulation: None
+    simulation.check_fields = lambda: written.append("checked")
     one._record()
     for _ in range(2):
         one._write_checkpoint()
     paths = [one.directory.checkpoint_path(number) for number in (0, 1)]
-    assert written == [(paths[0], 1), (paths[1], 1)]
+    assert written == ["checked", (paths[0], 1), "checked", (paths[1], 1)]
     assert (one.number, one.saved_step) == (2, 20)
     assert simulation.clock.phases == ["diagnostics", "output", "output"]
 

@@ -138,6 +138,15 @@ def test_a_kernel_that_is_wrong(extension, case):
         described('kernel = "bad"')
 
 
+@pytest.mark.parametrize(
+    ("file", "text"), [("kernels/wendland_c2.py", KERNEL), ("parts/heating/__init__.py", PART)]
+)
+def test_a_name_that_sph_has_is_refused_not_ignored(extension, file, text):
+    extension(file, text)
+    with pytest.raises(DeclarationError, match="has a choice of this name"):
+        described('kernel = "wendland_c2"')
+
+
 def test_a_switch_without_its_range_or_its_rate(extension):
     for missing in ("    min: Annotated[float, LOWEST]\n", "def alpha_rate"):
         extension(
