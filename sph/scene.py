@@ -3,6 +3,7 @@
 import math
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -52,7 +53,7 @@ class Scene:
     @cached_property
     def formulation(self) -> Formulation:
         kind = registry.part_class("sph.formulations", self.physics.formulation)
-        found = kind.of(self)
+        found: Any = kind.of(self)
         declarations.check_part(found, kind, optional=False)
         return found
 
@@ -147,9 +148,9 @@ class Scene:
             there, left_out = part.described()
             inside += there
             outside += [f"{what}: {why}" for what, why in left_out]
-        there = {type(part) for part in self.parts}
+        given = {type(part) for part in self.parts}
         for kind in parts.classes(self.physics.formulation):
-            if kind not in there:
+            if kind not in given:
                 outside.append(f"{kind.title}: physics.{kind.keys[0].name} is not given")
         limit = "time step limit u/|du/dt|"
         if self.physics.energy_limit:

@@ -1,5 +1,7 @@
 """The simulation: one time step after another. The parts of the scene hold the physics."""
 
+from typing import Any
+
 import numpy as np
 from numba.core.registry import cpu_target
 
@@ -42,9 +44,11 @@ class Simulation:
         self.steps_here = 0  # since the start or the last restart
         self.list_builds = 0
         self.held_supports = 0  # number of particles whose support is limited by max_support
-        self.limit = None
-        self.totals = None
-        self.baseline = None  # reference of the energy drift; set at the start or by `go_on_from`
+        # set by `begin` or `resume`
+        self.limit: step_size.StepLimit = None  # type: ignore[assignment]
+        self.totals: totals.Totals = None  # type: ignore[assignment]
+        # reference of the energy drift; set at the start or by `go_on_from`
+        self.baseline: totals.Baseline | None = None
         self.energy_drift = 0.0
         self.energy_added = 0.0  # by sources such as heating, since the start of the run
         self.energy_injected = 0.0  # to keep internal energies positive, since the start
@@ -179,7 +183,8 @@ class Simulation:
 
     def columns(self) -> dict[str, float]:
         """Return the columns of the history that only some scenes have (`Scene.columns`)."""
-        scene, found = self.scene, dict(self.totals.energies)
+        scene = self.scene
+        found: dict[str, Any] = dict(self.totals.energies)
         if scene.max_support < np.inf:
             found["held_supports"] = self.held_supports
         if scene.is_filled:
@@ -217,7 +222,7 @@ class Simulation:
         self.scene.domain.bring_inside(p.position, [getattr(p, f.name) for f in self._reflected])
 
     def _neighbours(self) -> passes.Neighbours:
-        search = self.search
+        search: Any = self.search  # whose lists are built before the first pass
         return passes.Neighbours(
             search.lists, search.images, search.origin.support, search.reach_factor
         )

@@ -5,7 +5,7 @@ the memory order, the contents of checkpoints, and the public names and units.
 """
 
 from collections.abc import Iterable, Mapping
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -101,6 +101,7 @@ class State:
     if TYPE_CHECKING:  # an attribute for each field; parts declare the fields
 
         def __getattr__(self, name: str) -> np.ndarray: ...
+        def __setattr__(self, name: str, value: Any) -> None: ...
 
     @classmethod
     def at_start(

@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from sph.part import Part
-from sph.state import COMMON, Public, State
+from sph.state import COMMON, Field, Public, State
 
 # Pressure is computed from the state, not stored in it.
 PRESSURE = Public("Pressures", -1, 1, -2, -5, "Pressure")
@@ -17,7 +17,7 @@ PRESSURE = Public("Pressures", -1, 1, -2, -5, "Pressure")
 class Formulation(Part):
     """The part with the basic equations. A scene has exactly one (`physics.formulation`)."""
 
-    fields = COMMON
+    fields: tuple[Field, ...] = COMMON
     roles: ClassVar[tuple[str, ...]] = ()  # of the terms that its pair loops call
     # The models that passes use, among them `kernel`, `eos`, `support_ratio` (H/h) and `eta`.
     models: Any

@@ -38,7 +38,7 @@ def copy_in(scratch, k, field, j, dim, sign, image):
     """Set scratch[..., k] to field[..., j], reflected by its rank: (N,), (D, N) or (D, D, N)."""
 
 
-@overload(copy_in, jit_options=INLINED)
+@overload(copy_in, jit_options=INLINED)  # type: ignore[arg-type]
 def _copy_in(scratch, k, field, j, dim, sign, image):
     if isinstance(field, types.NoneType | types.Omitted):
         return lambda scratch, k, field, j, dim, sign, image: None

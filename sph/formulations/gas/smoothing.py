@@ -34,7 +34,7 @@ def find_support(self, kernel, dim, r, m, nc, mass, H, ratio, reach, largest):
 class FixedPasses(NamedTuple):
     """Evaluate eqs 7, 8 and 15 `count` times; solve them if the last change of H is large."""
 
-    count: int
+    count: int  # type: ignore[assignment]
     tolerance: float  # of the solution, relative
     unsettled: float = UNSETTLED
 

@@ -58,6 +58,9 @@ HIGHEST = Parameter("largest alpha, approached in strong compression", at_least=
 class Switch(Coefficient):
     """Base of switches: alpha is between `min` and `max`; a pair uses the mean of both."""
 
+    min: float
+    max: float
+
     @classmethod
     def required(cls):
         return "min", "max", "alpha_after" if cls.finds_shocks else "alpha_rate"
@@ -134,7 +137,7 @@ class Viscosity(Part):
 
         alpha = scene.physics.alpha
         coefficient = (
-            constant.ConstantAlpha(alpha)
+            constant.ConstantAlpha(alpha)  # type: ignore[call-arg]
             if isinstance(alpha, float)
             else registry.model(SWITCHES, alpha.choice(), "switch")
         )
