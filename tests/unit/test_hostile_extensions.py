@@ -12,6 +12,7 @@ from sph import config, declarations, parts, preview, registry, runner
 from sph.cli import main
 from sph.clock import Clock
 from sph.config import choices, physics
+from sph.declarations import parts as declared
 from sph.errors import ConfigError, DeclarationError, NumericalError
 from sph.output import checkpoint, history, stored
 from sph.scene import Scene
@@ -276,11 +277,11 @@ def test_what_the_parts_of_sph_declare_in_some_scenes_is_reserved():
 
 def test_reserved_names_are_those_of_checkpoints_and_histories():
     checkpoint = {*stored.SCALARS, *stored.ENERGIES, *stored.LISTS}
-    assert checkpoint <= declarations.NOT_FIELDS
+    assert checkpoint <= declared.NOT_FIELDS
     scene = {"held_supports", "volume_ratio", "energy_added"}
-    assert {*history.columns(3), *scene} == declarations.NOT_COLUMNS
+    assert {*history.columns(3), *scene} == declared.NOT_COLUMNS
     assert (stored.NAME, 1 + max(r for r, _ in stored.ENTRIES)) == (
-        declarations.NAME, len(declarations.RANKS)
+        declared.NAME, len(declared.RANKS)
     )  # fmt: skip
 
 

@@ -135,7 +135,6 @@ class Gas(Formulation):
         def of(*names):
             return tuple(name for name in names if name in declared)
 
-        rated = "predicted_alpha" in declared
         return (
             Pass(
                 "density",
@@ -144,8 +143,7 @@ class Gas(Formulation):
                 of("position", "predicted_velocity", "mass", "predicted_energy", "support",
                    "predicted_alpha"),
                 of("support_before", "support", "density", "omega", "pressure", "energy_shift",
-                   "div_v", "curl_v", "pressure_term", "sound_speed", "balsara",
-                   *["alpha_rate"] * rated),
+                   "div_v", "curl_v", "pressure_term", "sound_speed", "balsara", "alpha_rate"),
                 widens=True,
             ),
             Pass(
@@ -155,7 +153,7 @@ class Gas(Formulation):
                 of("position", "predicted_velocity", "mass", "predicted_energy", "support",
                    "density", "pressure_term", "sound_speed", "balsara", "pressure",
                    "energy_shift", "exchange_share",
-                   "predicted_alpha" if rated else "alpha"),
+                   "predicted_alpha" if "predicted_alpha" in declared else "alpha"),
                 ("acceleration", "energy_rate", "signal_speed"),
             ),
         )  # fmt: skip

@@ -1,0 +1,21 @@
+"""Checks of what parts and models declare: errors name the class and say what is expected.
+
+A declaration is checked once: that of a class when its file is read, that of a part when a scene
+is put together, and what its methods return at the start of a run or restart.
+"""
+
+from sph.declarations.models import check_model, only_class
+from sph.declarations.parts import (
+    check_formulations,
+    check_keys,
+    check_part,
+    check_part_class,
+    check_together,
+)
+from sph.declarations.returned import check_arrays, check_issues, check_returned
+
+__all__ = [
+    "check_arrays", "check_formulations", "check_issues",
+    "check_keys", "check_model", "check_part", "check_part_class", "check_returned",
+    "check_together", "only_class",
+]  # fmt: skip
