@@ -69,18 +69,43 @@ STAGES = ("density", "gradients", "rates", "additions")
 class Pass(NamedTuple):
     """A computation over all particles between prediction and correction.
 
-    run(sweep) performs the computation (`sph.passes.Sweep`). `reads` and `writes` name fields; the
-    pass must set every value of each field in `writes`. A field that each step writes before it
-    reads it is not reordered when the memory order of particles changes.
+    `reads`, `updates` and `writes` name fields, or None in place of a field that the scene lacks.
+    The arrays of these fields, in this order, are arguments of `function`, None for None:
+
+        function(first, last, dim, models, neighbours, *arrays)    if Numba compiled it, for blocks
+                                                                   [first, last) (`sph.passes`)
+        function(*arrays)                                          otherwise, once for all particles
+
+    The function must set every value of each field in `writes`, and changes arrays in place. A
+    field that each step writes before it reads it is not reordered when the memory order of
+    particles changes.
     """
 
     stage: str
     phase: str  # in the CPU seconds by phase (`sph.clock`)
-    run: Callable[[Any], None]
-    reads: tuple[str, ...]
-    writes: tuple[str, ...]
-    widens: bool = False  # may request wider neighbour lists; the pass is then repeated
+    function: Callable[..., None]
+    reads: tuple[str | None, ...]
+    writes: tuple[str | None, ...] = ()
+    updates: tuple[str | None, ...] = ()  # read and written
+    swaps: tuple[str, str] | None = None  # two fields whose arrays are exchanged after the pass
+    widens: bool = False  # takes `wanted` as last argument (`sph.passes.Sweep`)
     at_start: bool = True  # also run before the first step
+    takes_step: bool = False  # takes the length of the step as last argument
+    models_at_start: Any = None  # before the first step, if not those of the formulation
+
+    @property
+    def arrays(self) -> tuple[str | None, ...]:
+        """The fields whose arrays are arguments, in order."""
+        return (*self.reads, *self.updates, *self.writes)
+
+    @property
+    def fields_read(self) -> set[str]:
+        return {name for name in (*self.reads, *self.updates) if name is not None}
+
+    @property
+    def fields_written(self) -> set[str]:
+        names = (*self.updates, *self.writes, *(self.swaps or ()))
+        return {name for name in names if name is not None}
 
 
 class Part:

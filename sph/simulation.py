@@ -234,7 +234,7 @@ class Simulation:
         for _ in range(MAX_WIDENINGS if one.widens else 1):
             sweep.neighbours = self._neighbours()
             with self.clock.phase(one.phase):
-                one.run(sweep)
+                sweep.make(one)
             sweep.neighbours = None  # so that `build` can free the lists
             if not one.widens:
                 return
@@ -277,8 +277,8 @@ def carried(scene: Scene) -> tuple[str, ...]:
     read: set[str] = set()
     written: set[str] = set()
     for one in scene.passes:
-        read |= {name for name in one.reads if name not in written}
-        written |= set(one.writes)
+        read |= one.fields_read - written
+        written |= one.fields_written
     return tuple(
         field.name for field in scene.fields if field.name in read or field.name not in written
     )

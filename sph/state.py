@@ -150,6 +150,12 @@ class State:
         """Return the arrays that a checkpoint stores, by name."""
         return {field.name: getattr(self, field.name) for field in self.fields if field.stored}
 
+    def swap(self, first: str, second: str) -> None:
+        """Exchange the arrays of two fields."""
+        arrays = getattr(self, first), getattr(self, second)
+        setattr(self, second, arrays[0])
+        setattr(self, first, arrays[1])
+
     def subset(self, indices: np.ndarray) -> "State":
         """Return a copy of the stored fields for the particles `indices`, in that order."""
         arrays = self.arrays().items()

@@ -94,10 +94,12 @@ def check_part(part: Any, kind: type[Part], optional: bool) -> None:
     for one in part.passes:
         if one.stage not in STAGES:
             raise wrong(kind, f"pass at stage {one.stage!r}: expected one of {', '.join(STAGES)}")
-        check_entries(kind, "reads", one.reads, str)
-        check_entries(kind, "writes", one.writes, str)
-        if not callable(one.run):
-            raise wrong(kind, f"pass at stage {one.stage!r}: run = {one.run!r} is not a function")
+        for name in ("reads", "updates", "writes"):
+            check_entries(kind, name, getattr(one, name), str | None)  # type: ignore[arg-type]
+        if not callable(one.function):
+            raise wrong(
+                kind, f"pass at stage {one.stage!r}: function = {one.function!r} is not a function"
+            )  # fmt: skip
     described = part.described()
     if not isinstance(described, tuple) or [type(one) for one in described] != [list, list]:
         raise wrong(kind, f"described() returned {described!r:.60}, expected a pair of lists")
@@ -189,7 +191,10 @@ def check_together(parts: Sequence[Part], kinds: Iterable[type[Part]], roles: An
 
 def _check_names(part: Part, fields: dict[str, Field]) -> None:
     """Check that what a part reads, writes, needs and evolves are fields of the scene."""
-    used = [(f"pass at stage {one.stage!r}", (*one.reads, *one.writes)) for one in part.passes]
+    used = [
+        (f"pass at stage {one.stage!r}", sorted(one.fields_read | one.fields_written))
+        for one in part.passes
+    ]
     used += [("needs", part.needs)]
     used += [("evolved", one[:3]) for one in part.evolved]
     for where, names in used:

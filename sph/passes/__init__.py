@@ -10,7 +10,9 @@ uses the argument from the compiled pass.
 from typing import Any, NamedTuple
 
 import numpy as np
+from numba.extending import is_jitted
 
+from sph.part import Pass
 from sph.state import State
 from sph.threads import Team
 
@@ -43,6 +45,22 @@ class Sweep:
         self.neighbours: Neighbours | None = None
         self.dt = 0.0  # of the present step
         self.is_start = False  # before the first step, where supports are guesses
+
+    def make(self, one: Pass) -> None:
+        """Run a pass once. If it requests wider lists, `swaps` waits until it has them."""
+        arrays = [None if name is None else getattr(self.state, name) for name in one.arrays]
+        if not is_jitted(one.function):
+            one.function(*arrays)
+            return
+        models = self.models
+        # Before the first step supports are guesses and must converge. Only the pass that finds
+        # them gets models for that, so no other pass is compiled twice.
+        if self.is_start and one.models_at_start is not None:
+            models = one.models_at_start
+        extra = [self.wanted] * one.widens + [self.dt] * one.takes_step
+        self.run(one.function, models, *arrays, *extra)
+        if one.swaps is not None and not (one.widens and self.wanted.max() > 0.0):
+            self.state.swap(*one.swaps)
 
     def run(self, function, models, *arguments) -> None:
         """Call function(first, last, dim, models, neighbours, *arguments) over ranges of blocks."""

@@ -54,12 +54,12 @@ def poison(simulation):
     def poisoned(one):
         kept = {}
         for field in state.fields:
-            if field.name not in one.reads and not field.integer:
+            if field.name not in one.fields_read and not field.integer:
                 kept[field.name] = getattr(state, field.name).copy()
                 getattr(state, field.name)[:] = np.nan
         make(one)
         for name, array in kept.items():
-            if name not in one.writes:
+            if name not in one.fields_written:
                 assert np.isnan(getattr(state, name)).all(), f"{one.phase} writes {name}"
                 getattr(state, name)[:] = array
 

@@ -239,7 +239,7 @@ def random_gas(case, lists, seed=3):
 
 def forget(one, state):
     """Set what a pass writes and does not read to NaN: what the pass forgets is then seen."""
-    for name in set(one.writes) - set(one.reads):
+    for name in filter(None, one.writes):
         getattr(state, name)[:] = np.nan
 
 
@@ -247,7 +247,7 @@ def make(one, sweep, search):
     sweep.neighbours = passes.Neighbours(
         search.lists, search.images, search.origin.support, search.reach_factor
     )
-    one.run(sweep)
+    sweep.make(one)
 
 
 def run_engine(case, gas, skin, threads):

@@ -203,7 +203,7 @@ BROKEN_PARTS = {
     "a pass that reads nothing": (with_pass('"rates", "x", print, ("b",), ()'), "'b' is not a f"),
     "a pass that writes nothing": (with_pass('"rates", "x", print, (), ("b",)'), "'b' is not a f"),
     "names as a text": (with_pass('"rates", "x", print, "mass", ()'), "reads = 'mass': expected"),
-    "no function": (with_pass('"rates", "x", None, (), ()'), "run = None is not a function"),
+    "no function": (with_pass('"rates", "x", None, (), ()'), "function = None is not a function"),
     "unknown evolved": (with_body('evolved = (Evolved("b", "b", "b", STRAIGHT),)'), "evolved: 'b'"),
     "evolved of two ranks": (evolved(1, 0, 0), "expected three fields of equal rank"),
     "evolved, not stored": (evolved(0, 0, 0, stored="False"), "expected value and rate to be st"),

@@ -133,56 +133,33 @@ class Gas(Formulation):
         declared = {field.name for part in (self, *scene.parts) for field in part.fields}
 
         def of(*names):
-            return tuple(name for name in names if name in declared)
+            return tuple(name if name in declared else None for name in names)
 
+        gas = ("position", "predicted_velocity", "mass", "predicted_energy", "support")
+        exchanged = "predicted_energy" if self.exchanges else None
+        alpha = "predicted_alpha" if "predicted_alpha" in declared else "alpha"
         return (
+            # steps 2-4 and 6: density, support, Omega, div v, curl v, EOS and rate of alpha
             Pass(
                 "density",
                 "density",
-                self._density,
-                of("position", "predicted_velocity", "mass", "predicted_energy", "support",
-                   "predicted_alpha"),
-                of("support_before", "support", "density", "omega", "pressure", "energy_shift",
-                   "div_v", "curl_v", "pressure_term", "sound_speed", "balsara", "alpha_rate"),
+                density,
+                of(*gas, "predicted_alpha"),
+                of("support_before", "density", "omega", "pressure", "energy_shift", "div_v",
+                   "curl_v", "pressure_term", "sound_speed", "balsara", "alpha_rate"),
+                swaps=("support", "support_before"),
                 widens=True,
+                models_at_start=self.starting_models,
             ),
+            # step 5: acceleration, du/dt, and the signal speed of each particle
             Pass(
                 "rates",
                 "rates",
-                self._rates,
-                of("position", "predicted_velocity", "mass", "predicted_energy", "support",
-                   "density", "pressure_term", "sound_speed", "balsara", "pressure",
-                   "energy_shift", "exchange_share",
-                   "predicted_alpha" if "predicted_alpha" in declared else "alpha"),
+                rates,
+                of(*gas, "density", "pressure_term", "sound_speed", alpha, "balsara", "pressure",
+                   "energy_shift", exchanged, "exchange_share"),
                 ("acceleration", "energy_rate", "signal_speed"),
             ),
-        )  # fmt: skip
-
-    def _density(self, sweep) -> None:
-        """Do steps 2-4 and 6: density, support, Omega, div v, curl v, EOS and rate of alpha."""
-        s = sweep.state
-        # Before the first step supports are guesses and must converge. Only this pass gets the
-        # models for that, so no other pass is compiled twice.
-        models = self.starting_models if sweep.is_start else sweep.models
-        sweep.run(
-            density, models, s.position, s.predicted_velocity, s.mass, s.predicted_energy,
-            s.support, s.get("predicted_alpha"), s.support_before, s.density, s.omega,
-            s.get("pressure"), s.get("energy_shift"), s.get("div_v"), s.get("curl_v"),
-            s.pressure_term, s.sound_speed, s.get("balsara"), s.get("alpha_rate"), sweep.wanted,
-        )  # fmt: skip
-        if not sweep.wanted.max() > 0.0:  # otherwise the pass is repeated from the old supports
-            s.support, s.support_before = s.support_before, s.support
-
-    def _rates(self, sweep) -> None:
-        """Do step 5: acceleration, du/dt, and the signal speed of each particle."""
-        s = sweep.state
-        alpha = s.get("predicted_alpha")
-        sweep.run(
-            rates, sweep.models, s.position, s.predicted_velocity, s.mass, s.predicted_energy,
-            s.support, s.density, s.pressure_term, s.sound_speed,
-            s.get("alpha") if alpha is None else alpha, s.get("balsara"), s.get("pressure"),
-            s.get("energy_shift"), s.predicted_energy if self.exchanges else None,
-            s.get("exchange_share"), s.acceleration, s.energy_rate, s.signal_speed,
         )  # fmt: skip
 
     @property

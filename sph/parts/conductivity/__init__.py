@@ -64,7 +64,7 @@ class Conductivity(Part):
                 Pass(
                     "gradients",
                     "conductivity",
-                    self._find_contacts,
+                    contacts,
                     ("position", "predicted_velocity", "mass", "predicted_energy", "support",
                      "density", "sound_speed"),
                     ("exchange_share",),
@@ -96,13 +96,6 @@ class Conductivity(Part):
         if self.exchange.switched:
             return [self.title, switch], []
         return [self.title], [(switch, "physics.conductivity is not switched")]
-
-    def _find_contacts(self, sweep) -> None:
-        s = sweep.state
-        sweep.run(
-            contacts, sweep.models, s.position, s.predicted_velocity, s.mass, s.predicted_energy,
-            s.support, s.density, s.sound_speed, s.exchange_share,
-        )  # fmt: skip
 
     def largest_courant(self):
         strength = self.exchange.strength

@@ -53,7 +53,7 @@ class External(Part):
     def __init__(self, field):
         self.field = field
         self.passes = (
-            Pass("additions", "rates", self._add, ("position", "acceleration"), ("acceleration",)),
+            Pass("additions", "rates", self._add, ("position",), updates=("acceleration",)),
         )
 
     @classmethod
@@ -67,9 +67,8 @@ class External(Part):
         misfit = None if field is None else field.misfit(problem.boundaries)
         return [("external", misfit)] if misfit else []
 
-    def _add(self, sweep) -> None:
-        state = sweep.state
-        state.acceleration += self.field.acceleration(state.position)
+    def _add(self, position, acceleration) -> None:
+        acceleration += self.field.acceleration(position)
 
     def energies(self, state):
         return {"potential_energy": self.field.potential(state.position)}

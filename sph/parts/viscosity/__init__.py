@@ -25,7 +25,7 @@ import math
 from sph import registry
 from sph.integrators.leapfrog import STRAIGHT
 from sph.model import Model, Parameter
-from sph.part import Evolved, Key, Part
+from sph.part import Evolved, Key, Part, Pass
 from sph.state import Field, Public
 
 SWITCHES = "sph.parts.viscosity.switches"
@@ -127,9 +127,20 @@ class Viscosity(Part):
         if balanced and dimension > 1:
             self.needs += ("curl_v",)
         if coefficient.finds_shocks:
-            from sph.parts.viscosity._shocks import find
+            from sph.parts.viscosity._shocks import shocks
 
-            self.passes = (find,)
+            self.passes = (
+                Pass(
+                    "gradients",
+                    "viscosity",
+                    shocks,
+                    ("position", "predicted_velocity", "mass", "support", "density", "sound_speed",
+                     "div_v", "acceleration"),
+                    updates=("alpha",),
+                    at_start=False,
+                    takes_step=True,
+                ),
+            )  # fmt: skip
 
     @classmethod
     def of(cls, scene):

@@ -15,7 +15,6 @@ from sph.compiled import COMPILED, INLINED, larger, smaller, verb
 from sph.formulations.gas.weighting import mass_per_weight, weight
 from sph.kernels import dw_over_q, normalisation, w
 from sph.neighbours.order import BLOCK
-from sph.part import Pass
 from sph.passes import TINY
 from sph.passes.gather import copy_in, most_candidates, place_in, unpacked
 
@@ -170,22 +169,3 @@ def shocks(
                 viscosity, alpha[i], dt, support[i], fastest, divergence, divergence_rate, shear,
                 signs,
             )  # fmt: skip
-
-
-def _find(sweep) -> None:
-    s = sweep.state
-    sweep.run(
-        shocks, sweep.models, s.position, s.predicted_velocity, s.mass, s.support, s.density,
-        s.sound_speed, s.div_v, s.acceleration, s.alpha, sweep.dt,
-    )  # fmt: skip
-
-
-find = Pass(
-    "gradients",
-    "viscosity",
-    _find,
-    ("position", "predicted_velocity", "mass", "support", "density", "sound_speed", "div_v",
-     "acceleration", "alpha"),
-    ("alpha",),
-    at_start=False,
-)  # fmt: skip

@@ -33,8 +33,9 @@ class Models(NamedTuple):
 
 @njit(**COMPILED)
 def density(
-    first_block, last_block, dim, models, neighbours, position, mass, energy, support, rho, P, c
-):
+    first_block, last_block, dim, models, neighbours, position, mass, energy, support, rho, P, c,
+    support_before,
+):  # fmt: skip
     """Density, pressure and sound speed."""
     start, count, candidates = neighbours.lists
     sign, offset = neighbours.images
@@ -57,6 +58,7 @@ def density(
             rho[i] = C * total / support[i] ** D
             P[i] = pressure(models.eos, rho[i], energy[i])
             c[i] = sound_speed(models.eos, rho[i], P[i])
+            support_before[i] = support[i]
 
 
 @njit(**COMPILED)
@@ -112,9 +114,9 @@ class Plain(Formulation):
         )
         gas = ("position", "mass", "predicted_energy", "support")
         self.passes = (
-            Pass("density", "density", self._density, gas,
+            Pass("density", "density", density, gas,
                  ("density", "pressure", "sound_speed", "support_before")),
-            Pass("rates", "rates", self._rates,
+            Pass("rates", "rates", rates,
                  ("position", "predicted_velocity", "mass", "support", "density", "pressure",
                   "sound_speed"),
                  ("acceleration", "energy_rate", "signal_speed")),
@@ -126,18 +128,6 @@ class Plain(Formulation):
 
     def described(self):
         return [f"plain SPH, kernel {self.models.kernel.name}"], []
-
-    def _density(self, sweep):
-        s = sweep.state
-        sweep.run(density, sweep.models, s.position, s.mass, s.predicted_energy, s.support,
-                  s.density, s.pressure, s.sound_speed)  # fmt: skip
-        s.support_before[:] = s.support
-
-    def _rates(self, sweep):
-        s = sweep.state
-        sweep.run(rates, sweep.models, s.position, s.predicted_velocity, s.mass, s.support,
-                  s.density, s.pressure, s.sound_speed, s.acceleration, s.energy_rate,
-                  s.signal_speed)  # fmt: skip
 
     def pressure(self, state):
         return self.eos.pressure(state.density, state.internal_energy)

@@ -38,8 +38,9 @@ class Tether(Part):
                 "additions",
                 "tether",
                 self._pull,
-                ("position", "predicted_velocity", "anchor", "acceleration"),
-                ("acceleration", "path_rate"),
+                reads=("position", "predicted_velocity", "anchor"),
+                updates=("acceleration",),
+                writes=("path_rate",),
             ),
         )
 
@@ -57,10 +58,9 @@ class Tether(Part):
     def start(self, state):
         state.anchor[:] = state.position
 
-    def _pull(self, sweep):
-        s = sweep.state
-        s.acceleration -= self.constant * (s.position - s.anchor)
-        s.path_rate = np.sqrt((s.predicted_velocity**2).sum(axis=0))
+    def _pull(self, position, velocity, anchor, acceleration, path_rate):
+        acceleration -= self.constant * (position - anchor)
+        path_rate[:] = np.sqrt((velocity**2).sum(axis=0))
 
     def step_limit(self, state):
         return np.full(state.number, 0.05 / np.sqrt(self.constant))
