@@ -1,11 +1,16 @@
 """Measurement of CPU and wall-clock time by phase. `sph.summary` defines the terms."""
 
 import time
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 
+import numpy as np
 from numba.core import event
 
 # The phase in which Numba fills its tables, on first use. `Clock.cpu` does not contain this phase.
 STARTING = "start of Numba"
+
+SHORTEST = 1e-9  # seconds: the clock's resolution
 
 
 class Clock(event.Listener):
@@ -44,6 +49,16 @@ class Clock(event.Listener):
     def phase(self, name: str) -> "Phase":
         """Add the CPU time of a `with` block to the phase `name`, without compilation."""
         return Phase(self, name)
+
+    @contextmanager
+    def divided(self, names: Sequence[str], shares: np.ndarray) -> Iterator[None]:
+        """Divide the CPU time of a `with` block among phases, in proportion to `shares`."""
+        compiled, began = self.compiling, time.process_time()
+        yield
+        spent = time.process_time() - began - (self.compiling - compiled)
+        scale = spent / max(float(shares.sum()), SHORTEST)
+        for name, share in zip(names, shares.tolist(), strict=True):
+            self.seconds[name] = self.seconds.get(name, 0.0) + scale * share
 
     @property
     def wall(self) -> float:

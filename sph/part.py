@@ -108,6 +108,10 @@ class Pass(NamedTuple):
         return {name for name in names if name is not None}
 
 
+# The methods of a part that each step calls, unless they are those of `Part`.
+IN_PYTHON = ("split", "split_predicted", "step_limit", "energies", "sums", "check")
+
+
 class Part:
     """Optional physics, or a formulation. `name` is the name of its folder."""
 
@@ -131,6 +135,7 @@ class Part:
     keeps_momentum: bool = True
     bounds_acceleration: bool = False  # whether |a| bounds the step
     adds_energy: bool = False  # whether `split` may add energy
+    idle: tuple[str, ...] = ()  # those methods of IN_PYTHON that do nothing in this scene
 
     def __init_subclass__(cls) -> None:
         cls.name = cls.__module__.rpartition(".")[2]

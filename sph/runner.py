@@ -23,6 +23,7 @@ from sph.output.run_directory import RunDirectory
 from sph.scene import Scene
 from sph.shell_words import quoted
 from sph.simulation import Simulation
+from sph.steps import MOST, rows
 from sph.stop_signals import stop_signals
 from sph.threads import available_processors
 
@@ -149,7 +150,7 @@ class Runner:
 
     def from_start(self) -> dict:
         with self._closing():
-            self._record()
+            self._record_present()
             self._write_checkpoint()
             return self._to_end()
 
@@ -160,7 +161,7 @@ class Runner:
                 self.wall_before = past["wall_seconds"][-1]
                 self.cpu_before = past["cpu_seconds"][-1]
             else:  # a checkpoint without history: begin one, whose first row has no limiter
-                self._record()
+                self._record_present()
             return self._to_end()
 
     @contextmanager
@@ -182,14 +183,18 @@ class Runner:
         times = output_times(end, self.config.output.interval, simulation.time)
         if held := faults.held_courant(simulation.scene):
             self.progress.note(held)
+        # diagnostics are those of each step
+        most = 1 if self.config.problem.has_diagnostics else MOST
         self.progress.start(simulation.time, end)
         try:
             for output in times:
                 while simulation.time < output:
                     if self.stopped_by:
                         self._stop(self.stopped_by[0])
-                    simulation.advance(output)
-                    self._record()
+                    try:
+                        simulation.proceed(output, most)
+                    finally:
+                        self._record()
                     self.progress.step(simulation)
                 self._write_checkpoint()
         except NumericalError as error:
@@ -221,34 +226,24 @@ class Runner:
             f"`sph restart {quoted(self.directory.path)}` continues the run."
         )
 
+    def _record_present(self) -> None:
+        self.simulation.rows.append(rows.of_simulation(self.simulation))
+        self._record()
+
     def _record(self) -> None:
-        """Add a row to the history: the present state, and the next step allowed."""
-        simulation, totals, limit = self.simulation, self.simulation.totals, self.simulation.limit
-        row = {
-            "step": simulation.step,
-            "t": simulation.time,
-            "dt": limit.dt,
-            "limiter_particle": limit.particle,
-            "limiter": limit.criterion,
-            "kinetic_energy": totals.kinetic_energy,
-            "kinetic_energy_without_bulk": totals.kinetic_energy_without_bulk,
-            "internal_energy": totals.internal_energy,
-            "total_energy": totals.energy,
-            "energy_drift": simulation.energy_drift,
-            "energy_injected": simulation.energy_injected,
-            "min_density": totals.min_density,
-            "max_density": totals.max_density,
-            "min_internal_energy": totals.min_internal_energy,
-            "max_internal_energy": totals.max_internal_energy,
-            "wall_seconds": round(self.wall_before + simulation.clock.wall, 6),
-            "cpu_seconds": round(self.cpu_before + simulation.clock.cpu, 6),
-        }
-        momentum = zip("xyz", totals.momentum.tolist(), strict=False)
-        row |= {f"momentum_{axis}": component for axis, component in momentum}
-        row |= simulation.columns()
-        with simulation.clock.phase("diagnostics"):
-            row |= self.config.problem.diagnostics(simulation.particles)
-        self.history.append(row)
+        """Add the rows of the steps since the last call to the history."""
+        simulation, problem = self.simulation, self.config.problem
+        for columns in simulation.rows:
+            columns["wall_seconds"] = [
+                round(self.wall_before + t, 6) for t in columns["wall_seconds"]
+            ]
+            columns["cpu_seconds"] = [round(self.cpu_before + t, 6) for t in columns["cpu_seconds"]]
+            if problem.has_diagnostics:
+                with simulation.clock.phase("diagnostics"):
+                    found = problem.diagnostics(simulation.particles)
+                columns |= {name: [value] for name, value in found.items()}
+            self.history.extend(columns)
+        simulation.rows.clear()
 
     def _write_checkpoint(self) -> None:
         """Flush the history, then write the checkpoint."""

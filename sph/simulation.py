@@ -14,6 +14,7 @@ from sph.part import Pass
 from sph.passes import nearest
 from sph.scene import Scene
 from sph.state import State
+from sph.steps import Steps, rows
 from sph.threads import Team
 from sph.watchdog import Watchdog
 
@@ -62,9 +63,11 @@ class Simulation:
             field for field in scene.fields if field.rank and field.name in self._carried
             and field.name != "position"
         ]  # fmt: skip
-        self._sweep = passes.Sweep(
+        self.sweep = passes.Sweep(
             particles, self.team, number_of_blocks(particles.number), scene.formulation.models
         )
+        self.rows: list[rows.Columns] = []  # of the history, not yet recorded
+        self._steps = Steps(self)
 
     @classmethod
     def start(cls, scene: Scene, threads: int, clock: Clock) -> "Simulation":
@@ -88,13 +91,13 @@ class Simulation:
         resolution.check_extent(self)
         leapfrog.keep(self.particles, self.evolved)
         self._build_lists(dt=0.0, guess=True)
-        self._sweep.is_start = True
+        self.sweep.is_start = True
         for one in self.scene.passes:
             if one.at_start:
                 self._make(one)
             if one.widens:
                 resolution.check(self)
-        self._sweep.is_start = False
+        self.sweep.is_start = False
         declarations.check_returned(self.scene.all_parts, self.particles)
         self._measure(past=None)
         self.check_fields()
@@ -135,18 +138,32 @@ class Simulation:
 
         Raises NumericalError if the new state is unphysical.
         """
-        allowed = self.limit.dt
-        dt, landing = allowed, False
-        # a rest of a billionth of a step is a rounding error: this step covers it
-        if self.time + dt * (1 + 1e-9) >= until:
-            dt, landing = until - self.time, True
-        p, sweep = self.particles, self._sweep
-        sweep.dt = dt
+        dt, lands = step_size.next_step(self.time, self.limit.dt, until)
+        p = self.particles
         with self.clock.phase("predict, correct"):
             self._split(dt / 2)
             self.energy_injected += leapfrog.predict(p, self.evolved, dt)
             for part in self.scene.all_parts:
                 part.split_predicted(p, dt / 2)
+        self.complete(dt, until if lands else self.time + dt)
+
+    def proceed(self, until: float, most: int) -> None:
+        """Take one or more steps, up to `most`, which end at `until` or earlier.
+
+        Appends rows of the history to `rows`. Raises NumericalError; `rows` then has those of the
+        steps before.
+        """
+        if self._steps.may_begin:
+            self._steps.take(until, most)
+        else:
+            self.advance(until)
+            self.rows.append(rows.of_simulation(self))
+
+    def complete(self, dt: float, end: float) -> None:
+        """Do what follows the prediction in a step of length dt, which ends at the time `end`."""
+        p, allowed = self.particles, self.limit.dt
+        self.sweep.dt = dt
+        with self.clock.phase("predict, correct"):
             stale = self.search.stale(p.position, p.support)
         if stale:
             self._build_lists(dt)
@@ -157,7 +174,7 @@ class Simulation:
             self._split(dt / 2)
         self.step += 1
         self.steps_here += 1
-        self.time = until if landing else self.time + dt
+        self.time = end
         self._measure(step_size.Past(dt, allowed))
 
     def check_fields(self) -> None:
@@ -177,8 +194,8 @@ class Simulation:
         """
         p = self.particles
         found = np.empty(p.number)
-        self._sweep.neighbours = self._neighbours()
-        self._sweep.run(nearest.nearest, None, p.position, p.support, p.mass, p.density, found)
+        self.sweep.neighbours = self.neighbours()
+        self.sweep.run(nearest.nearest, None, p.position, p.support, p.mass, p.density, found)
         return found
 
     def columns(self) -> dict[str, float]:
@@ -216,12 +233,13 @@ class Simulation:
                 p.support = self.search.guess(p.position, models.support_ratio * models.eta)
             skin = self.search.skin_for(p.predicted_velocity, p.support, dt)
             self.search.build(Origin(p.position.copy(), p.support.copy(), skin), p.id)
+        self._steps.has_new_lists = True
 
     def _bring_inside(self) -> None:
         p = self.particles
         self.scene.domain.bring_inside(p.position, [getattr(p, f.name) for f in self._reflected])
 
-    def _neighbours(self) -> passes.Neighbours:
+    def neighbours(self) -> passes.Neighbours:
         search: Any = self.search  # whose lists are built before the first pass
         return passes.Neighbours(
             search.lists, search.images, search.origin.support, search.reach_factor
@@ -229,10 +247,10 @@ class Simulation:
 
     def _make(self, one: Pass) -> None:
         """Run a pass, and repeat it with wider lists as long as it requests them."""
-        sweep, p = self._sweep, self.particles
+        sweep, p = self.sweep, self.particles
         sweep.wanted.fill(1.0)
         for _ in range(MAX_WIDENINGS if one.widens else 1):
-            sweep.neighbours = self._neighbours()
+            sweep.neighbours = self.neighbours()
             with self.clock.phase(one.phase):
                 sweep.make(one)
             sweep.neighbours = None  # so that `build` can free the lists
@@ -244,6 +262,7 @@ class Simulation:
             with self.clock.phase("lists"):
                 self._bring_inside()
                 self.search.widen(p.position, sweep.wanted, p.id)
+            self._steps.has_new_lists = True
         raise faults.starved(self, int(np.argmax(sweep.wanted)))
 
     def _check_found(self) -> None:

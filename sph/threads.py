@@ -29,6 +29,10 @@ class Team:
         self.threads = threads
         self._pool = ThreadPoolExecutor(threads, "sph") if threads > 1 else None
 
+    def shares(self, items: int, smallest: int = SMALLEST_RANGE) -> bool:
+        """Whether several threads would share `items`."""
+        return self.threads > 1 and items // smallest >= 2
+
     def run(
         self, function: Callable[..., None], items: int, *arguments: Any,
         smallest: int = SMALLEST_RANGE,
@@ -37,11 +41,11 @@ class Team:
 
         No range is shorter than `smallest` items.
         """
-        # four ranges per thread balance the load where some ranges cost more than others
-        ranges = min(4 * self.threads, items // smallest)
-        if self._pool is None or ranges < 2:
+        if self._pool is None or not self.shares(items, smallest):
             function(0, items, *arguments)
             return
+        # four ranges per thread balance the load where some ranges cost more than others
+        ranges = min(4 * self.threads, items // smallest)
         edges = [items * k // ranges for k in range(ranges + 1)]
         calls = [
             self._pool.submit(function, first, last, *arguments)

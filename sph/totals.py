@@ -5,6 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 from numba import njit
+from numba.extending import register_jitable
 
 from sph.compiled import COMPILED
 
@@ -63,10 +64,15 @@ class Baseline(NamedTuple):
 
     def drift(self, totals: Totals, added: float) -> float:
         """Return the change of energy since the start, less the energy added, over the scale."""
-        change = totals.energy_without_bulk - added - self.energy
-        if self.scale > 0.0:
-            return float(change / self.scale)
-        return math.copysign(math.inf, change) if change else 0.0
+        return float(drift_of(totals.energy_without_bulk, added, self.energy, self.scale))
+
+
+@register_jitable
+def drift_of(energy: float, added: float, initial: float, scale: float) -> float:
+    change = energy - added - initial
+    if scale > 0.0:
+        return change / scale
+    return math.copysign(math.inf, change) if change != 0.0 else 0.0
 
 
 class Budget(NamedTuple):
@@ -83,20 +89,21 @@ def of(state, parts, keeps_momentum) -> Totals:
     keeps_momentum: (D,), 1.0 for axes along which momentum is conserved, 0.0 for others.
     """
     s = state
-    kinetic, relative, internal, *others = _totals(
+    momentum = np.empty(s.dimension)
+    kinetic, relative, internal, *others = sums(
         s.mass, s.velocity, s.internal_energy, s.density, s.acceleration, s.energy_rate,
-        keeps_momentum,
+        keeps_momentum, momentum,
     )  # fmt: skip
     energies = {
         name: float(s.mass @ each) for part in parts for name, each in part.energies(s).items()
     }
-    return Totals(kinetic, relative, internal, energies, *others)
+    return Totals(kinetic, relative, internal, energies, momentum, *others)
 
 
 @njit(**COMPILED)
-def _totals(mass, velocity, energy, density, acceleration, energy_rate, keeps_momentum):
+def sums(mass, velocity, energy, density, acceleration, energy_rate, keeps_momentum, momentum):
+    """Return the numbers of `Totals` except `energies` and momentum, which is written, (D,)."""
     D, n = velocity.shape
-    momentum = np.zeros(D)
     kinetic = relative = internal = volume = rates = all_mass = 0.0
     lowest_density = lowest_energy = np.inf
     highest_density = highest_energy = -np.inf
@@ -124,6 +131,6 @@ def _totals(mass, velocity, energy, density, acceleration, energy_rate, keeps_mo
             squares += mass[i] * (velocity[d, i] - bulk) ** 2
         relative += 0.5 * squares
     return (
-        kinetic, relative, internal, momentum, volume, lowest_density, highest_density,
+        kinetic, relative, internal, volume, lowest_density, highest_density,
         lowest_energy, highest_energy, rates,
     )  # fmt: skip

@@ -7,6 +7,7 @@ check has failed, in open domains, and for gas that can be under tension.
 import math
 
 import numpy as np
+from numba.extending import register_jitable
 
 from sph.faults import (
     LARGEST,
@@ -47,7 +48,7 @@ class Watchdog:
         self.max_drift = scene.config.physics.max_energy_drift
         box, kinds = scene.domain.box, scene.domain.boundaries
         open_axes = [axis for axis, kind in enumerate(kinds) if kind == "open"]
-        self._fences = [
+        self.fences = [
             (axis, lo - FAR * (hi - lo), hi + FAR * (hi - lo))
             for axis in open_axes
             for lo, hi in [box[axis]]
@@ -84,7 +85,7 @@ class Watchdog:
         self._check_energy(simulation)
         self._check_volume(simulation)
         self._check_fences(simulation)
-        self._check_pace(simulation)
+        self.check_pace(simulation)
 
     def check_fields(self, simulation) -> None:
         """Raise NumericalError for values of stored fields that no checkpoint may hold.
@@ -106,10 +107,9 @@ class Watchdog:
 
     def _check_numbers(self, simulation) -> None:
         totals, dt = simulation.totals, simulation.limit.dt
-        sums = (totals.energy, totals.max_density, totals.rates, dt)
-        positive = totals.min_density > 0 and totals.min_internal_energy >= 0
-        finite = all(map(math.isfinite, sums))
-        if positive and finite and simulation.time + dt > simulation.time:
+        sums = (totals.energy, totals.max_density, totals.rates)
+        lowest = (totals.min_density, totals.min_internal_energy)
+        if is_sound(*sums, dt, *lowest, simulation.time):
             return
         p = simulation.particles
         tests = (
@@ -122,9 +122,9 @@ class Watchdog:
         for name, values, bad in tests:
             if bad.any():
                 raise fault_of(simulation, name, values, bad, of_numbers(simulation))
-        if not all(map(math.isfinite, sums[:-1])):
+        if not all(map(math.isfinite, sums)):
             raise endless_sum(simulation)
-        why = "too small to advance time" if finite else "which is not finite"
+        why = "too small to advance time" if math.isfinite(dt) else "which is not finite"
         raise fault(
             simulation,
             f"the time step fell to {dt:.3g}, {why}; it is {what_sets(simulation)}",
@@ -147,7 +147,7 @@ class Watchdog:
 
     def _check_volume(self, simulation) -> None:
         ratio = simulation.volume_ratio
-        if ratio is None or simulation.step < SETTLING or 1 / MOST_VOLUME < ratio < MOST_VOLUME:
+        if ratio is None or simulation.step < SETTLING or fits_box(ratio):
             return
         raise fault(
             simulation,
@@ -158,7 +158,7 @@ class Watchdog:
 
     def _check_fences(self, simulation) -> None:
         p = simulation.particles
-        for axis, low, high in self._fences:
+        for axis, low, high in self.fences:
             x = p.position[axis]
             if x.min() < low or x.max() > high:
                 i = int(np.argmax(np.maximum(low - x, x - high)))
@@ -170,7 +170,12 @@ class Watchdog:
                     int(p.id[i]),
                 )
 
-    def _check_pace(self, simulation) -> None:
+    def steps_to_mark(self, step: int) -> int:
+        """Return the number of steps until the next check of the pace that may find something."""
+        return 1 if self._marked is None else self._marked[1] + WINDOW - step
+
+    def check_pace(self, simulation) -> None:
+        """Raise NumericalError if steps have become so short that the run cannot end."""
         if self._marked is None:
             self._marked = simulation.time, simulation.step
         time, step = self._marked
@@ -197,3 +202,26 @@ class Watchdog:
             )
         self._longest = max(self._longest, covered)
         self._marked = simulation.time, simulation.step
+
+
+# --- conditions that Python and compiled steps (`sph.steps`) share ------------------------------
+
+
+@register_jitable
+def is_sound(energy, max_density, rates, dt, min_density, min_energy, time) -> bool:
+    """Whether sums are finite, density and internal energy physical, and dt advances time."""
+    return (
+        min_density > 0.0
+        and min_energy >= 0.0
+        and math.isfinite(energy)
+        and math.isfinite(max_density)
+        and math.isfinite(rates)
+        and math.isfinite(dt)
+        and time + dt > time
+    )
+
+
+@register_jitable
+def fits_box(ratio: float) -> bool:
+    """Whether sum m/rho over the volume of the box is physical."""
+    return 1 / MOST_VOLUME < ratio < MOST_VOLUME

@@ -192,7 +192,7 @@ def check_together(parts: Sequence[Part], kinds: Iterable[type[Part]], roles: An
 def _check_names(part: Part, fields: dict[str, Field]) -> None:
     """Check that what a part reads, writes, needs and evolves are fields of the scene."""
     used = [
-        (f"pass at stage {one.stage!r}", sorted(one.fields_read | one.fields_written))
+        (f"pass at stage {one.stage!r}", tuple(sorted(one.fields_read | one.fields_written)))
         for one in part.passes
     ]
     used += [("needs", part.needs)]

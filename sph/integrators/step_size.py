@@ -31,6 +31,7 @@ from typing import NamedTuple
 
 import numpy as np
 from numba import njit
+from numba.extending import register_jitable
 
 from sph.compiled import COMPILED
 from sph.neighbours.approach import first_contact
@@ -39,6 +40,8 @@ from sph.state import State
 
 # Criteria of every scene; those of parts have the names of the parts.
 CRITERIA = ("signal_speed", "energy", "acceleration", "support", "growth", "end", "approach")
+
+SUPPORT, GROW, END, APPROACH = 3, 4, 5, 6  # indices in CRITERIA
 
 SUPPORT_CHANGE = 0.2
 GROWTH = 1.5
@@ -133,13 +136,9 @@ def limit(bounds: Bounds, state: State, parts: tuple[Part, ...], past: Past | No
             dt, criterion = float(times.min()), part.name
             particle = s.id[~(times > dt)].min()
     rate, changed = _rate_of_supports(s, past)
-    if rate * dt > SUPPORT_CHANGE:
-        dt, particle, criterion = SUPPORT_CHANGE / rate, changed, "support"
-    if past is not None and dt > GROWTH * past.limit:
-        dt, particle, criterion = GROWTH * past.limit, 0, "growth"
-    if dt > bounds.end:
-        dt, particle, criterion = bounds.end, 0, "end"
-    return StepLimit(dt, int(particle), criterion)
+    allowed = np.inf if past is None else past.limit
+    dt, particle, index = restricted(dt, particle, 0, rate, changed, allowed, bounds.end)
+    return StepLimit(dt, int(particle), CRITERIA[index] if index else criterion)
 
 
 def before_contact(limit: StepLimit, bounds: Bounds, particles: State, domain) -> StepLimit:
@@ -156,11 +155,47 @@ def _rate_of_supports(state: State, past: Past | None) -> tuple[float, int]:
     """Return the largest |dH/dt|/H, from div v if available, and the particle's ID."""
     divergence = state.get("div_v")
     if divergence is not None:
-        rate, particle = _fastest_change(divergence, state.id)
-        return rate / state.dimension, particle
+        change, particle = _fastest_change(divergence, state.id)
+        return rate_of_supports(change, True, state.dimension, 0.0), particle
     if past is None:
         return 0.0, 0
     change, particle = _largest_change(state.support, state.support_before, state.id)
+    return rate_of_supports(change, False, state.dimension, past.dt), particle
+
+
+# --- formulas that Python and compiled steps (`sph.steps`) share --------------------------------
+
+
+@register_jitable
+def next_step(time: float, limit: float, until: float) -> tuple[float, bool]:
+    """Return the length of the step from `time`, and whether it ends at `until`."""
+    # a rest of a billionth of a step is a rounding error: this step covers it
+    if time + limit * (1 + 1e-9) >= until:
+        return until - time, True
+    return limit, False
+
+
+@register_jitable
+def rate_of_supports(change: float, is_divergence: bool, dimension: int, dt: float) -> float:
+    """Return the largest |dH/dt|/H from the largest |div v|, or from the change of H in a step."""
+    if is_divergence:
+        return change / dimension
     # smaller changes cannot exceed SUPPORT_CHANGE in a step; they may come from the iteration of H,
     # which continues in steps of any length
-    return (change / past.dt if change > SUPPORT_CHANGE / GROWTH else 0.0), particle
+    return change / dt if change > SUPPORT_CHANGE / GROWTH else 0.0
+
+
+@register_jitable
+def restricted(dt, particle, criterion, rate, changed, allowed, end):
+    """Return (dt, particle, criterion), changed if another limit is smaller than dt.
+
+    criterion: index in CRITERIA; rate, changed: largest |dH/dt|/H, and its particle; allowed: the
+    limit of the last step, inf at the start; end: the time at which the run ends.
+    """
+    if rate * dt > SUPPORT_CHANGE:
+        dt, particle, criterion = SUPPORT_CHANGE / rate, changed, SUPPORT
+    if dt > GROWTH * allowed:
+        dt, particle, criterion = GROWTH * allowed, 0, GROW
+    if dt > end:
+        dt, particle, criterion = end, 0, END
+    return dt, particle, criterion

@@ -83,11 +83,15 @@ class History:
 
     def append(self, row: Mapping[str, object]) -> None:
         """Add the row of a step. Raises KeyError if the value of a column is missing."""
-        values = [str(row[name]) for name in self.columns]
+        self.extend({name: [value] for name, value in row.items()})
+
+    def extend(self, columns: Mapping[str, Sequence[object]]) -> None:
+        """Add rows of steps, by column. Raises KeyError if a column is missing."""
+        texts = [map(str, columns[name]) for name in self.columns]
         for column in self._texts:
-            values[column] = _quoted(values[column])
+            texts[column] = map(_quoted, texts[column])
         # csv.writer looks at every digit for a comma, which takes half as long again
-        self._lines.write(",".join(values) + "\n")
+        self._lines.writelines(",".join(row) + "\n" for row in zip(*texts, strict=True))
 
     def flush(self) -> None:
         """Write and sync the rows added so far. Needed before a checkpoint of the same step.

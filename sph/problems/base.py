@@ -156,6 +156,11 @@ class Problem(Section):
         """
         return {}
 
+    @property
+    def has_diagnostics(self) -> bool:
+        """Whether `diagnostics` returns columns."""
+        return type(self).diagnostics is not Problem.diagnostics
+
     def report(self, eos, time: float, particles, pressure) -> dict[str, float]:
         """Return additional numbers for the summary that need no exact solution."""
         return {}

@@ -245,7 +245,7 @@ def test_counted_passes_at_mass_jump_diverge_without_solver(begin):
     def farthest(unsettled):
         simulation = begin(x[None], "periodic", mass)
         models = simulation.scene.formulation.models
-        simulation._sweep.models = models._replace(
+        simulation.sweep.models = models._replace(
             smoothing=models.smoothing._replace(unsettled=unsettled)
         )
         (density,) = (one for one in simulation.scene.passes if one.stage == "density")

@@ -74,10 +74,10 @@ def hollow(monkeypatch):
         def run(function, *_):
             called.setdefault(function, set()).add(clock.now)
             if function is density:
-                one._sweep.wanted[:] = 0.0
-                one._sweep.wanted[one.asked.pop() if one.asked else []] = 1.0
+                one.sweep.wanted[:] = 0.0
+                one.sweep.wanted[one.asked.pop() if one.asked else []] = 1.0
 
-        one._sweep.team = SimpleNamespace(run=run)
+        one.sweep.team = SimpleNamespace(run=run)
         n, sums = one.particles.number, SimpleNamespace(volume=1.0)
         for name, result in (("order", np.arange(n)), ("guess", np.ones(n)), ("skin_for", 0.1),
                              ("build", None), ("stale", True), ("widen", None)):  # fmt: skip

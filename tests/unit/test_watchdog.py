@@ -294,7 +294,7 @@ def test_collapsing_step_stops_run(begin, monkeypatch):
     with pytest.raises(NumericalError, match=r"time step has collapsed to .*, limited by particle"):
         run(simulation, math.inf)
     assert simulation.step < 25 + 41  # within two windows
-    monkeypatch.setattr(watchdog.Watchdog, "_check_pace", lambda *_: None)
+    monkeypatch.setattr(watchdog.Watchdog, "check_pace", lambda *_: None)
     time = simulation.time
     for _ in range(100):
         simulation.advance(math.inf)
@@ -306,11 +306,11 @@ def after_windows(simulation, *lengths):
     limit = step_size.StepLimit(dt=1e-3, particle=0, criterion="growth")
     state = SimpleNamespace(time=0.0, step=0, limit=limit, scene=simulation.scene)
     dog = watchdog.Watchdog(simulation.scene)
-    dog._check_pace(state)
+    dog.check_pace(state)
     for covered in lengths:
         state.step += watchdog.WINDOW
         state.time += covered
-        dog._check_pace(state)
+        dog.check_pace(state)
 
 
 def test_pace_compared_with_best_so_far(begin):
@@ -512,7 +512,7 @@ def test_run_far_too_slow_to_finish_stops(begin, monkeypatch):
     monkeypatch.setattr(watchdog, "WINDOW", 20)
     with pytest.raises(NumericalError, match="cannot reach"):
         run(begin("physics.C=1e-17"))
-    monkeypatch.setattr(watchdog.Watchdog, "_check_pace", lambda *_: None)
+    monkeypatch.setattr(watchdog.Watchdog, "check_pace", lambda *_: None)
     simulation = begin("physics.C=1e-17")
     for _ in range(50):
         simulation.advance(0.2)

@@ -187,10 +187,10 @@ def test_pace_that_never_finishes_is_reported(covered, words):
     def run():
         state = quiet()
         dog = watchdog.Watchdog(state.scene)
-        dog._check_pace(state)
+        dog.check_pace(state)
         for length in covered:
             state.step, state.time = state.step + watchdog.WINDOW, state.time + length
-            dog._check_pace(state)
+            dog.check_pace(state)
 
     if words is None:
         run()
@@ -203,15 +203,15 @@ def test_remaining_steps_counted_from_now():
     """A pace of 0.2e-12 a window is too slow for 0.25 and not for the 0.15 that are left."""
     dog, state = watchdog.Watchdog(quiet().scene), quiet()
     state.time = 0.1
-    dog._check_pace(state)
+    dog.check_pace(state)
     state.step, state.time = state.step + watchdog.WINDOW, state.time + 0.2e-12
-    dog._check_pace(state)
+    dog.check_pace(state)
     late = quiet()
     dog = watchdog.Watchdog(late.scene)
-    dog._check_pace(late)
+    dog.check_pace(late)
     late.step, late.time = late.step + watchdog.WINDOW, 0.2e-12
     with pytest.raises(NumericalError, match="cannot reach"):
-        dog._check_pace(late)
+        dog.check_pace(late)
 
 
 @pytest.mark.parametrize(("step", "is_looked_at"), [(1999, False), (2000, True)])
@@ -219,10 +219,10 @@ def test_pace_window_starts_after_last(step, is_looked_at):
     """A restart at step 1000: the first look is after a whole window."""
     dog, state = watchdog.Watchdog(quiet().scene), quiet()
     state.step = 1000
-    dog._check_pace(state)
+    dog.check_pace(state)
     state.step = step
     if not is_looked_at:
-        dog._check_pace(state)
+        dog.check_pace(state)
         return
     with pytest.raises(NumericalError, match="cannot reach"):
-        dog._check_pace(state)
+        dog.check_pace(state)

@@ -1,0 +1,197 @@
+"""Calls of compiled functions by address, with arguments held in memory.
+
+If a compiled function calls another by name, Numba links the code of the callee into that of the
+caller and optimises it again. A call by address needs no second compilation, and the caller's own
+code depends neither on the callee nor on the types of its arguments.
+
+Numba's native functions take their arguments flattened: an array is a sequence of integers (address
+of the data, shape, strides), a tuple is the sequence of its entries. A `Table` holds such arguments
+as 64-bit words. A thunk, a few instructions made here for each native signature, loads the words of
+a call and calls the function:
+
+    words of a call: address of the function, RESULTS words for its result, its arguments
+"""
+
+import struct
+from collections.abc import Callable, Iterator
+from typing import Any, NamedTuple
+
+import llvmlite.binding as llvm
+import numpy as np
+from llvmlite import ir
+from numba import types
+from numba.core.typing.typeof import Purpose, typeof
+from numba.extending import intrinsic
+
+RESULTS = 12  # words for the result of a function
+
+WORD = ir.IntType(64)
+STATUS = ir.IntType(32)  # of a call: 0 if the function raised no exception
+
+_thunks: dict[str, int] = {}  # addresses by native signature
+_engines: list[llvm.ExecutionEngine] = []  # which own the code of the thunks
+
+
+class Held(NamedTuple):
+    """An argument, or an entry of a tuple, whose words a table finds again by name."""
+
+    name: str
+    value: Any
+
+
+class Table:
+    """Calls with their arguments in memory."""
+
+    def __init__(self):
+        self._words: list[int] = []
+        self._begins: list[int] = []
+        self._kinds: list[ir.FunctionType] = []
+        self.places: dict[str, list[int]] = {}  # of `Held` arguments: indices of their first words
+
+    def add(self, function: Callable[..., Any], *arguments: Any) -> None:
+        """Add a call of a function that Numba compiled, with arguments or `Held` arguments."""
+        signature = tuple(typeof(_plain(one), Purpose.argument) for one in arguments)
+        function.compile(signature)  # type: ignore[attr-defined]
+        found = function.overloads[signature]  # type: ignore[attr-defined]
+        described = found.fndesc
+        _check_result(described.restype)
+        kind = found.target_context.call_conv.get_function_type(
+            described.restype, described.argtypes
+        )
+        begin = len(self._words)
+        self._begins.append(begin)
+        self._kinds.append(kind)
+        self._words.append(found.library.get_pointer_to_function(described.llvm_func_name))
+        self._words += [0] * RESULTS
+        for one in arguments:
+            for name, word in _flat(one):
+                if name is None:
+                    self._words.append(word)
+                else:
+                    self.places.setdefault(name, []).append(len(self._words))
+        expected = len(kind.args) - 2  # besides the places of the result and the exception
+        if len(self._words) - begin - 1 - RESULTS != expected:
+            raise AssertionError(f"{function}: expected {expected} words of arguments")
+
+    def finished(self) -> tuple[np.ndarray, np.ndarray]:
+        """Return the words, and for each call (K, 2) the address of its thunk and its first word.
+
+        int64; the words must not be moved in memory.
+        """
+        words = np.array(self._words, np.int64)
+        thunks = _thunks_of(self._kinds)
+        return words, np.array(list(zip(thunks, self._begins, strict=True)), np.int64)
+
+
+def words_of(argument: Any) -> list[int]:
+    """Return the words of an argument, as signed integers."""
+    return [word for name, word in _flat(argument) if name is None]
+
+
+def _plain(argument: Any) -> Any:
+    """Return an argument without `Held`."""
+    if isinstance(argument, Held):
+        return _plain(argument.value)
+    if isinstance(argument, tuple):
+        plain = [_plain(one) for one in argument]
+        return type(argument)(*plain) if hasattr(argument, "_fields") else tuple(plain)
+    return argument
+
+
+def _flat(argument: Any) -> Iterator[tuple[str | None, int]]:
+    """Yield (None, word) for each word of an argument, and (name, 0) before those of a `Held`."""
+    if isinstance(argument, Held):
+        # the address of an array comes after two words of its owner, which stay 0, and its size
+        ahead = 4 if isinstance(argument.value, np.ndarray) else 0
+        for index, one in enumerate(_flat(argument.value)):
+            if index == ahead:
+                yield argument.name, 0
+            yield one
+    elif argument is None:
+        yield None, 0
+    elif isinstance(argument, tuple):
+        for one in argument:
+            yield from _flat(one)
+    elif isinstance(argument, np.ndarray):
+        shape = argument.shape, argument.strides
+        owners = 0, 0
+        for word in (*owners, argument.size, argument.itemsize, address(argument), *shape[0],
+                     *shape[1]):  # fmt: skip
+            yield None, word
+    elif isinstance(argument, float):
+        yield None, struct.unpack("q", struct.pack("d", argument))[0]
+    else:
+        yield None, int(argument)
+
+
+def address(array: np.ndarray) -> int:
+    """Return the address of the first entry."""
+    return array.__array_interface__["data"][0]
+
+
+def _check_result(kind: Any) -> None:
+    """Check that a result is words in order: a number, or a tuple of numbers."""
+    entries = list(kind.types) if isinstance(kind, types.BaseTuple) else [kind]
+    known = types.float64, types.int64, types.none
+    if len(entries) > RESULTS or any(one not in known for one in entries):
+        raise AssertionError(f"expected up to {RESULTS} numbers as result, not {kind}")
+
+
+def _thunks_of(kinds: list[ir.FunctionType]) -> list[int]:
+    """Return the addresses of the thunks for native signatures."""
+    new = {str(kind): kind for kind in kinds if str(kind) not in _thunks}
+    if new:
+        module = ir.Module()
+        module.triple = llvm.get_process_triple()
+        for number, kind in enumerate(new.values()):
+            _write_thunk(module, f"thunk{number}", kind)
+        # loads and a call: there is nothing to optimise
+        machine = llvm.Target.from_default_triple().create_target_machine(opt=0)
+        engine = llvm.create_mcjit_compiler(llvm.parse_assembly(str(module)), machine)
+        engine.finalize_object()
+        _engines.append(engine)
+        for number, text in enumerate(new):
+            _thunks[text] = engine.get_function_address(f"thunk{number}")
+    return [_thunks[str(kind)] for kind in kinds]
+
+
+def _write_thunk(module: ir.Module, name: str, kind: ir.FunctionType) -> None:
+    function = ir.Function(module, ir.FunctionType(STATUS, [WORD.as_pointer()]), name)
+    builder = ir.IRBuilder(function.append_basic_block())
+
+    def place(index, of):
+        slot = builder.gep(function.args[0], [ir.Constant(WORD, index)])
+        return builder.bitcast(slot, of.as_pointer())
+
+    result, exception, *arguments = kind.args
+    callee = builder.inttoptr(builder.load(place(0, WORD)), kind.as_pointer())
+    loaded = [
+        builder.load(place(index, one)) for index, one in enumerate(arguments, start=1 + RESULTS)
+    ]
+    unused = builder.alloca(exception.pointee)
+    builder.ret(builder.call(callee, [place(1, result.pointee), unused, *loaded]))
+
+
+@intrinsic
+def call(typingctx, thunk, words):
+    """Call a thunk with the address of the first word of a call. Returns the status."""
+
+    def generate(context, builder, signature, arguments):
+        kind = ir.FunctionType(STATUS, [WORD.as_pointer()])
+        function = builder.inttoptr(arguments[0], kind.as_pointer())
+        return builder.call(function, [builder.inttoptr(arguments[1], WORD.as_pointer())])
+
+    return types.int32(types.int64, types.int64), generate
+
+
+@intrinsic
+def read_clock(typingctx, function, clock, time):
+    """Call clock_gettime at an address; `time` is the address of two words, s and ns."""
+
+    def generate(context, builder, signature, arguments):
+        kind = ir.FunctionType(STATUS, [STATUS, WORD.as_pointer()])
+        called = builder.inttoptr(arguments[0], kind.as_pointer())
+        which = builder.trunc(arguments[1], STATUS)
+        return builder.call(called, [which, builder.inttoptr(arguments[2], WORD.as_pointer())])
+
+    return types.int32(types.int64, types.int64, types.int64), generate
