@@ -1,8 +1,7 @@
 """Measurement of CPU and wall-clock time by phase. `sph.summary` defines the terms."""
 
 import time
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 
 import numpy as np
 from numba.core import event
@@ -50,12 +49,8 @@ class Clock(event.Listener):
         """Add the CPU time of a `with` block to the phase `name`, without compilation."""
         return Phase(self, name)
 
-    @contextmanager
-    def divided(self, names: Sequence[str], shares: np.ndarray) -> Iterator[None]:
-        """Divide the CPU time of a `with` block among phases, in proportion to `shares`."""
-        compiled, began = self.compiling, time.process_time()
-        yield
-        spent = time.process_time() - began - (self.compiling - compiled)
+    def divide(self, spent: float, names: Sequence[str], shares: np.ndarray) -> None:
+        """Divide CPU seconds among phases, in proportion to `shares`."""
         scale = spent / max(float(shares.sum()), SHORTEST)
         for name, share in zip(names, shares.tolist(), strict=True):
             self.seconds[name] = self.seconds.get(name, 0.0) + scale * share

@@ -23,7 +23,7 @@ from sph.output.run_directory import RunDirectory
 from sph.scene import Scene
 from sph.shell_words import quoted
 from sph.simulation import Simulation
-from sph.steps import MOST, rows
+from sph.steps import MOST
 from sph.stop_signals import stop_signals
 from sph.threads import available_processors
 
@@ -150,7 +150,7 @@ class Runner:
 
     def from_start(self) -> dict:
         with self._closing():
-            self._record_present()
+            self.simulation.keep_row()
             self._write_checkpoint()
             return self._to_end()
 
@@ -161,7 +161,7 @@ class Runner:
                 self.wall_before = past["wall_seconds"][-1]
                 self.cpu_before = past["cpu_seconds"][-1]
             else:  # a checkpoint without history: begin one, whose first row has no limiter
-                self._record_present()
+                self.simulation.keep_row()
             return self._to_end()
 
     @contextmanager
@@ -170,6 +170,7 @@ class Runner:
             yield
         except BaseException:  # report this error, not one of closing the history
             with suppress(FileError):
+                self._record()
                 self.history.close()
             raise
         else:
@@ -191,9 +192,8 @@ class Runner:
                 while simulation.time < output:
                     if self.stopped_by:
                         self._stop(self.stopped_by[0])
-                    try:
-                        simulation.proceed(output, most)
-                    finally:
+                    simulation.proceed(output, most)
+                    if self.config.problem.has_diagnostics:
                         self._record()
                     self.progress.step(simulation)
                 self._write_checkpoint()
@@ -226,30 +226,27 @@ class Runner:
             f"`sph restart {quoted(self.directory.path)}` continues the run."
         )
 
-    def _record_present(self) -> None:
-        self.simulation.rows.append(rows.of_simulation(self.simulation))
-        self._record()
-
     def _record(self) -> None:
         """Add the rows of the steps since the last call to the history."""
         simulation, problem = self.simulation, self.config.problem
-        for columns in simulation.rows:
-            columns["wall_seconds"] = [
-                round(self.wall_before + t, 6) for t in columns["wall_seconds"]
-            ]
-            columns["cpu_seconds"] = [round(self.cpu_before + t, 6) for t in columns["cpu_seconds"]]
-            if problem.has_diagnostics:
+        for columns in simulation.take_rows():
+            for name, before in (
+                ("wall_seconds", self.wall_before),
+                ("cpu_seconds", self.cpu_before),
+            ):
+                columns[name] = [round(before + seconds, 6) for seconds in columns[name]]
+            if problem.has_diagnostics:  # a row at a time
                 with simulation.clock.phase("diagnostics"):
                     found = problem.diagnostics(simulation.particles)
                 columns |= {name: [value] for name, value in found.items()}
             self.history.extend(columns)
-        simulation.rows.clear()
 
     def _write_checkpoint(self) -> None:
         """Flush the history, then write the checkpoint."""
         simulation = self.simulation
         simulation.check_fields()
         path = self.directory.checkpoint_path(self.number)
+        self._record()
         with simulation.clock.phase("output"):
             self.history.flush()
             checkpoints.write(path, self._checkpoint())
@@ -261,6 +258,7 @@ class Runner:
         return state_of(self.simulation, self.lineage)
 
     def _close(self, status: str, reason: str | None = None) -> dict:
+        self._record()
         self.history.flush()
         result = summary.of_run(
             self.simulation,

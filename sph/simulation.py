@@ -90,7 +90,7 @@ class Simulation:
         self.watchdog.check_range(self)
         resolution.check_extent(self)
         leapfrog.keep(self.particles, self.evolved)
-        self._build_lists(dt=0.0, guess=True)
+        self.build_lists(dt=0.0, guess=True)
         self.sweep.is_start = True
         for one in self.scene.passes:
             if one.at_start:
@@ -150,14 +150,24 @@ class Simulation:
     def proceed(self, until: float, most: int) -> None:
         """Take one or more steps, up to `most`, which end at `until` or earlier.
 
-        Appends rows of the history to `rows`. Raises NumericalError; `rows` then has those of the
-        steps before.
+        Keeps the rows of the history of valid steps for `take_rows`. Raises NumericalError.
         """
         if self._steps.may_begin:
             self._steps.take(until, most)
         else:
             self.advance(until)
-            self.rows.append(rows.of_simulation(self))
+            self.keep_row()
+
+    def keep_row(self) -> None:
+        """Keep the row of the history of the present state. Raises NumericalError."""
+        self._steps.pour()
+        self.rows.append(rows.of_simulation(self))
+
+    def take_rows(self) -> list[rows.Columns]:
+        """Return the rows of the history that were kept since the last call, as columns."""
+        self._steps.pour()
+        kept, self.rows = self.rows, []
+        return kept
 
     def complete(self, dt: float, end: float) -> None:
         """Do what follows the prediction in a step of length dt, which ends at the time `end`."""
@@ -166,7 +176,7 @@ class Simulation:
         with self.clock.phase("predict, correct"):
             stale = self.search.stale(p.position, p.support)
         if stale:
-            self._build_lists(dt)
+            self.build_lists(dt)
         for one in self.scene.passes:
             self._make(one)
         with self.clock.phase("predict, correct"):
@@ -220,7 +230,7 @@ class Simulation:
 
     # --- the parts of a step ---
 
-    def _build_lists(self, dt: float, guess: bool = False) -> None:
+    def build_lists(self, dt: float, guess: bool = False) -> None:
         """Reorder the particles and build the candidate lists."""
         p = self.particles
         self.list_builds += 1

@@ -14,6 +14,7 @@ import numpy as np
 from numba.extending import is_jitted
 
 from sph import totals
+from sph.clock import SHORTEST
 from sph.errors import NumericalError
 from sph.integrators import leapfrog, step_size
 from sph.neighbours import search
@@ -23,7 +24,9 @@ from sph.scene import Scene
 from sph.steps import driver, rows
 from sph.steps.calls import Held, Table, address, words_of
 
-MOST = 256  # steps in a call
+MOST = 512  # steps whose rows are kept as numbers
+
+LONGEST = 0.05  # seconds after which `take` returns, so that stop signals are heeded
 
 # Steps that a session takes before compiled ones, which take some ten milliseconds to set up.
 ORDINARY = 10
@@ -61,6 +64,9 @@ class Steps:
         self._kinds: list[np.dtype] = []  # of the arrays in the lists
         self._momentum = np.empty(simulation.scene.dimension)
         self._fences = np.array(simulation.watchdog.fences, np.float64).reshape(-1, 3)
+        self._table = np.empty((MOST, driver.MOMENTUM + simulation.scene.dimension))
+        self._filled = 0  # rows of the table,
+        self._first = 0  # the first of which is that of this step
         passes = [one.phase for one in simulation.scene.passes]
         self._phases = list(dict.fromkeys((*PHASES, *passes)))
 
@@ -71,51 +77,75 @@ class Steps:
         return self._suit and s.steps_here >= ORDINARY and not s.team.shares(s.sweep.wanted.size)
 
     def take(self, until: float, most: int) -> None:
-        """Take up to `most` steps, which end at `until` or earlier. Raises NumericalError.
+        """Take up to `most` steps, which end at `until` or earlier. Raises NumericalError."""
+        s = self._simulation
+        most = min(most, s.watchdog.steps_to_mark(s.step))
+        if self._filled + most > MOST:
+            self.pour()
+            most = min(most, MOST)
+        now = np.array([s.time, s.limit.dt, s.energy_injected, s.held_supports, 0.0, 0.0, 0.0])
+        begun, is_predicted, end = time.perf_counter(), False, self._filled + most
+        while True:
+            longest = LONGEST + begun - time.perf_counter()
+            reason = self._call(until, now, end, is_predicted, longest)
+            if reason != driver.STALE:
+                break
+            s.build_lists(float(now[driver.LENGTH]))
+            now[driver.REACH] = s.search.reach_factor
+            is_predicted = True
+        if reason == driver.WIDER:
+            s.complete(float(now[driver.LENGTH]), float(now[driver.UNTIL]))
+            s.keep_row()
 
-        Appends the rows of valid steps to those of the simulation.
-        """
+    def pour(self) -> None:
+        """Append the rows of the steps since the last call to those of the simulation."""
+        s = self._simulation
+        if self._filled:
+            table = self._table[: self._filled]
+            s.rows.append(rows.of_table(s.scene, table, self._first))
+            self._filled = 0
+
+    def _call(self, until: float, now: np.ndarray, end: int, *options: Any) -> int:
+        """Call the driver, and set the simulation to the state after it. Return the reason."""
         s, clock = self._simulation, self._simulation.clock
-        with clock.phase(PHASES[1]):
-            self._prepare()
-        most = min(most, MOST, s.watchdog.steps_to_mark(s.step))
-        table = np.empty((most, driver.MOMENTUM + self._momentum.size))
-        now = driver.Now(*np.array(
-            [[s.time], [s.limit.dt], [s.energy_injected], [s.held_supports], [0.0]]
-        ))  # fmt: skip
-        spent = np.zeros(len(self._phases))
         wall, cpu = clock.wall, clock.cpu
-        with clock.divided(self._phases, spent):
-            reason, steps, dt, end, swapped = driver.take(
-                self._plan, self._bounds(until), self._arrays(), self._words, self._numbers, now,
-                table, spent,
-            )  # fmt: skip
-        span = rows.Span(wall, cpu, clock.wall, clock.cpu)
+        self._prepare()
+        table = self._table[self._filled : end]
+        spent = np.zeros(len(self._phases))
+        is_predicted, longest = options
+        reason, steps, swapped = driver.take(
+            self._plan, self._bounds(until, longest), self._arrays(), self._words, self._numbers,
+            now, table, spent, is_predicted,
+        )  # fmt: skip
         if swapped:
             s.particles.swap(*SWAPPED)
             self._held |= {name: getattr(s.particles, name) for name in SWAPPED}
-        s.energy_injected = float(now.injected[0])
-        s.held_supports, s.search.reach_factor = int(now.held[0]), float(now.reach[0])
+        s.energy_injected = float(now[driver.GIVEN])
+        s.held_supports, s.search.reach_factor = int(now[driver.LIMITED]), float(now[driver.REACH])
+        used = clock.cpu - cpu
+        clock.divide(used, self._phases, spent)
         if steps:
-            self._end(table[:steps], span, reason == driver.DOUBTFUL)
-        if reason in (driver.STALE, driver.WIDER):
-            s.complete(dt, end)
-            s.rows.append(rows.of_simulation(s))
+            taken = table[:steps]
+            share = used / max(clock.wall - wall, SHORTEST)
+            taken[:, driver.CPU] = cpu + share * taken[:, driver.WALL]
+            taken[:, driver.WALL] += wall
+            self._end(taken, reason == driver.DOUBTFUL)
+        return reason
 
-    def _end(self, table: np.ndarray, span: rows.Span, is_doubtful: bool) -> None:
-        """Set the simulation to the end of the steps in `table`, and check the last one."""
-        s, last = self._simulation, table[-1].tolist()
-        columns = rows.of_table(s, table, s.step + 1, span)
+    def _end(self, taken: np.ndarray, is_doubtful: bool) -> None:
+        """Set the simulation to the end of steps, and check the last one. Raises NumericalError."""
+        s, last = self._simulation, taken[-1].tolist()
+        if not self._filled:
+            self._first = s.step + 1
+        self._filled += len(taken)
         s.time = last[driver.TIME]
-        s.step += len(table)
-        s.steps_here += len(table)
+        s.step += len(taken)
+        s.steps_here += len(taken)
         kinetic, relative, internal, *others = last[driver.KINETIC : driver.RATES + 1]
-        momentum = table[-1, driver.MOMENTUM :].copy()
+        momentum = taken[-1, driver.MOMENTUM :].copy()
         s.totals = totals.Totals(kinetic, relative, internal, {}, momentum, *others)
         s.energy_drift = last[driver.DRIFT]
-        s.limit = step_size.StepLimit(
-            last[driver.STEP_LIMIT], columns["limiter_particle"][-1], columns["limiter"][-1]
-        )
+        s.limit = rows.limit_of(s.scene, last)
         try:
             if is_doubtful:
                 s.watchdog.check(s)
@@ -123,14 +153,12 @@ class Steps:
             else:
                 s.watchdog.check_pace(s)
         except NumericalError:
-            columns = {name: values[:-1] for name, values in columns.items()}
+            self._filled -= 1
             raise
-        finally:
-            s.rows.append(columns)
 
     # --- what the driver is given ---
 
-    def _bounds(self, until: float) -> driver.Bounds:
+    def _bounds(self, until: float, longest: float) -> driver.Bounds:
         s = self._simulation
         scene, bounds = s.scene, s.scene.step_bounds
         return driver.Bounds(
@@ -145,6 +173,7 @@ class Steps:
             added=s.energy_added,
             box_volume=scene.domain.volume if scene.is_filled else 0.0,
             step=s.step,
+            longest=longest,
         )
 
     def _arrays(self) -> driver.Arrays:
@@ -159,7 +188,7 @@ class Steps:
         s = self._simulation
         neighbours, held = s.neighbours(), self._present()
         kinds = [one.dtype for one in _arrays_in(neighbours)]
-        if self._plan is None or (self.has_new_lists and kinds != self._kinds):
+        if self._plan is None or kinds != self._kinds:
             self._build(neighbours, held)
         elif self.has_new_lists:
             words = words_of(neighbours)

@@ -2,8 +2,8 @@
 
 `take` makes the same calls in the same order as `Simulation.advance`, by address (`calls`), so its
 own code is one for all scenes. It returns where Python is needed: at `until`, after a number of
-steps or LONGEST seconds, where lists must be built or widened, and after a step whose sums the
-watchdog might refuse. No flag of fast arithmetic is set, so numbers have the bits of Python's.
+steps or seconds, where lists must be built or widened, and after a step whose sums the watchdog
+might refuse. No flag of fast arithmetic is set, so numbers have the bits of Python's.
 """
 
 import math
@@ -17,17 +17,16 @@ from sph.steps.calls import call, read_clock
 from sph.totals import drift_of
 from sph.watchdog import SETTLING, fits_box, is_sound
 
-LONGEST = 0.05  # seconds after which a call returns, so that stop signals are heeded
-
-# Why `take` returned. Python completes a step after its prediction if lists are stale or the first
-# pass requests wider lists, and repeats the watchdog's checks of a doubtful step.
+# Why `take` returned. Python builds stale lists after the prediction of a step, which the next call
+# completes; it completes a step whose first pass requests wider lists; and it repeats the
+# watchdog's checks of a doubtful step.
 PAUSED, STALE, WIDER, DOUBTFUL = range(4)
 
 # Columns of the rows, one row a step; the components of momentum follow.
 (
     TIME, STEP_LIMIT, LIMITER, CRITERION, KINETIC, RELATIVE, INTERNAL, VOLUME, MIN_DENSITY,
-    MAX_DENSITY, MIN_ENERGY, MAX_ENERGY, RATES, DRIFT, INJECTED, HELD, SECONDS, MOMENTUM,
-) = range(18)  # fmt: skip
+    MAX_DENSITY, MIN_ENERGY, MAX_ENERGY, RATES, DRIFT, INJECTED, HELD, WALL, CPU, MOMENTUM,
+) = range(19)  # fmt: skip
 
 OPTIONS = {"cache": True, "nogil": True, "error_model": "numpy"}
 
@@ -67,6 +66,7 @@ class Bounds(NamedTuple):
     added: float
     box_volume: float  # of a box that gas fills; 0 for others
     step: int  # number of steps before the call
+    longest: float  # seconds after which the call returns
 
 
 class Arrays(NamedTuple):
@@ -81,68 +81,66 @@ class Arrays(NamedTuple):
     fences: np.ndarray  # (F, 3) axis, lowest and highest position
 
 
-class Now(NamedTuple):
-    """What changes from step to step: arrays with one entry."""
-
-    time: np.ndarray
-    limit: np.ndarray  # of the next step
-    injected: np.ndarray
-    held: np.ndarray  # number of supports limited by max_support
-    reach: np.ndarray  # reach factor of the lists
+# Entries of the array `now`, which changes from step to step: time, limit of the next step, energy
+# injected, number of supports limited by max_support, reach factor of the lists, and length and end
+# of the last step.
+NOW, LIMIT, GIVEN, LIMITED, REACH, LENGTH, UNTIL = range(7)
 
 
 @njit(**OPTIONS)
-def take(plan, bounds, arrays, words, numbers, now, rows, spent):
-    """Take up to len(rows) steps. Return (reason, steps, dt, end, swapped).
+def take(plan, bounds, arrays, words, numbers, now, rows, spent, is_predicted):
+    """Take up to len(rows) steps. Return (reason, number of steps, swapped).
 
     words, numbers: the words of the calls, as int64 and float64 in the same memory; spent: seconds
-    by phase. dt, end: length of the last step, and the time at its end. swapped: whether the two
-    swapped arrays have changed places. Raises MemoryError.
+    by phase; is_predicted: whether the call begins after the prediction of a step, with new lists.
+    swapped: whether the two swapped arrays have changed places. The column WALL of the rows has
+    seconds since the call, CPU is left out. Raises MemoryError.
     """
     calls, passes = plan.calls, plan.motion + 1
     correction = passes + plan.swaps.size
     moment = np.empty(2, np.int64)
     begun = last = _nanoseconds(plan.clock, moment)
     swapped = False
-    steps, dt, end = 0, 0.0, 0.0
-    while steps < rows.shape[0] and now.time[0] < bounds.until:
-        allowed = now.limit[0]
-        dt, lands = next_step(now.time[0], allowed, bounds.until)
-        end = bounds.until if lands else now.time[0] + dt
-        _set(numbers, plan.dt, dt)
-        now.injected[0] += _run(calls, 0, plan.motion, words, numbers)
-        moved = _run(calls, plan.motion, passes, words, numbers)
-        grown = numbers[calls[plan.motion, 1] + 2]
-        now.reach[0] = reach = 1.0 + bounds.skin - 2.0 * moved
-        if not reach > grown:
-            return STALE, steps, dt, end, swapped
-        _set(numbers, plan.reach, reach)
+    steps = 0
+    while steps < rows.shape[0] and (is_predicted or now[NOW] < bounds.until):
+        if not is_predicted:
+            dt, lands = next_step(now[NOW], now[LIMIT], bounds.until)
+            now[LENGTH], now[UNTIL] = dt, (bounds.until if lands else now[NOW] + dt)
+            _set(numbers, plan.dt, dt)
+            now[GIVEN] += _run(calls, 0, plan.motion, words, numbers)
+            moved = _run(calls, plan.motion, passes, words, numbers)
+            grown = numbers[calls[plan.motion, 1] + 2]
+            now[REACH] = 1.0 + bounds.skin - 2.0 * moved
+            if not now[REACH] > grown:
+                return STALE, steps, swapped
+        is_predicted = False
+        _set(numbers, plan.reach, now[REACH])
         last = _stamp(plan.clock, moment, last, spent, 0)
         arrays.wanted[:] = 1.0
         for index in range(plan.swaps.size):
             _run(calls, passes + index, passes + index + 1, words, numbers)
             if index == 0 and plan.widens and not _found(arrays.wanted, arrays.density):
-                return WIDER, steps, dt, end, swapped
+                return WIDER, steps, swapped
             if plan.swaps[index]:
                 swapped = not swapped
                 _exchange(words, plan.first, plan.second)
             if index == 0 and plan.widens and bounds.max_support < np.inf:
                 support = arrays.second if swapped else arrays.first
-                now.held[0] = _number_of(support, bounds.max_support)
+                now[LIMITED] = _number_of(support, bounds.max_support)
             last = _stamp(plan.clock, moment, last, spent, plan.phases[index])
-        now.injected[0] += _run(calls, correction, calls.shape[0] - 4, words, numbers)
-        now.time[0] = end
+        now[GIVEN] += _run(calls, correction, calls.shape[0] - 4, words, numbers)
+        now[NOW] = now[UNTIL]
         last = _stamp(plan.clock, moment, last, spent, 0)
         row = rows[steps]
-        _measure(plan, bounds, arrays, words, numbers, now, dt, allowed, row)
+        _measure(plan, bounds, arrays, words, numbers, now, row)
         steps += 1
         last = _stamp(plan.clock, moment, last, spent, 1)
-        row[SECONDS] = 1e-9 * (last - begun)
+        row[WALL] = 1e-9 * (last - begun)
         if not _passes_checks(bounds, arrays, bounds.step + steps, row):
-            return DOUBTFUL, steps, dt, end, swapped
-        if row[SECONDS] > LONGEST:
+            return DOUBTFUL, steps, swapped
+        if row[WALL] > bounds.longest:
             break
-    return PAUSED, steps, dt, end, swapped
+    return PAUSED, steps, swapped
 
 
 @njit(**OPTIONS)
@@ -206,7 +204,7 @@ def _number_of(support, largest):
 
 
 @njit(**OPTIONS)
-def _measure(plan, bounds, arrays, words, numbers, now, dt, allowed, row):
+def _measure(plan, bounds, arrays, words, numbers, now, row):
     """Write a row, and the limit of the next step: `totals.of`, `step_size.limit`."""
     calls = plan.calls
     K = calls.shape[0]
@@ -221,22 +219,22 @@ def _measure(plan, bounds, arrays, words, numbers, now, dt, allowed, row):
         row[MOMENTUM + d] = arrays.momentum[d]
     energy = row[RELATIVE] + row[INTERNAL] + 0.0
     row[DRIFT] = drift_of(energy, bounds.added, bounds.baseline_energy, bounds.baseline_scale)
-    rate = rate_of_supports(numbers[change], plan.has_divergence, D, dt)
+    rate = rate_of_supports(numbers[change], plan.has_divergence, D, now[LENGTH])
     limit, particle, criterion = restricted(
         bounds.courant * numbers[smallest], words[smallest + 1], words[smallest + 2], rate,
-        words[change + 1], allowed, bounds.end,
+        words[change + 1], now[LIMIT], bounds.end,
     )  # fmt: skip
     _set(numbers, plan.next_dt, limit)
     part = _run(calls, K - 1, K, words, numbers)
     if part < 1.0:
         limit, particle, criterion = part * limit, words[contact + 1], APPROACH
-    now.limit[0] = limit
-    row[TIME] = now.time[0]
+    now[LIMIT] = limit
+    row[TIME] = now[NOW]
     row[STEP_LIMIT] = limit
     row[LIMITER] = particle
     row[CRITERION] = criterion
-    row[INJECTED] = now.injected[0]
-    row[HELD] = now.held[0]
+    row[INJECTED] = now[GIVEN]
+    row[HELD] = now[LIMITED]
 
 
 @njit(**OPTIONS)

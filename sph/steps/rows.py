@@ -1,23 +1,14 @@
 """Rows of the history, as columns: from a simulation, or from a table of compiled steps."""
 
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
-from sph.clock import SHORTEST
-from sph.integrators.step_size import CRITERIA
+from sph.integrators.step_size import CRITERIA, StepLimit
+from sph.scene import Scene
 from sph.steps import driver
 
 Columns = dict[str, list]
-
-
-class Span(NamedTuple):
-    """Wall-clock and CPU seconds of a session when compiled steps began, and when they ended."""
-
-    wall: float
-    cpu: float
-    wall_end: float
-    cpu_end: float
 
 
 def of_simulation(simulation: Any) -> Columns:
@@ -48,16 +39,10 @@ def of_simulation(simulation: Any) -> Columns:
     return {name: [value] for name, value in row.items()}
 
 
-def of_table(simulation: Any, table: np.ndarray, first: int, span: Span) -> Columns:
-    """Return the rows of steps from the number `first`; `table` has the rows of `driver`.
-
-    A step's CPU seconds are its share of those of all steps, in proportion to wall-clock time.
-    """
-    scene, columns = simulation.scene, table.T
-    criteria = (scene.step_bounds.criterion, *CRITERIA[1:])
+def of_table(scene: Scene, table: np.ndarray, first: int) -> Columns:
+    """Return the rows of steps from the number `first`; `table` has the rows of `driver`."""
+    columns = table.T
     axes = "xyz"[: scene.dimension]
-    elapsed = columns[driver.SECONDS]
-    share = (span.cpu_end - span.cpu) / max(span.wall_end - span.wall, SHORTEST)
     found = {
         "t": columns[driver.TIME],
         "dt": columns[driver.STEP_LIMIT],
@@ -73,8 +58,8 @@ def of_table(simulation: Any, table: np.ndarray, first: int, span: Span) -> Colu
         "max_density": columns[driver.MAX_DENSITY],
         "min_internal_energy": columns[driver.MIN_ENERGY],
         "max_internal_energy": columns[driver.MAX_ENERGY],
-        "wall_seconds": span.wall + elapsed,
-        "cpu_seconds": span.cpu + share * elapsed,
+        "wall_seconds": columns[driver.WALL],
+        "cpu_seconds": columns[driver.CPU],
     }
     if "held_supports" in scene.columns:
         found["held_supports"] = columns[driver.HELD].astype(np.int64)
@@ -82,5 +67,16 @@ def of_table(simulation: Any, table: np.ndarray, first: int, span: Span) -> Colu
         found["volume_ratio"] = columns[driver.VOLUME] / scene.domain.volume
     lists = {name: column.tolist() for name, column in found.items()}
     lists["step"] = list(range(first, first + len(table)))
+    criteria = _criteria(scene)
     lists["limiter"] = [criteria[int(index)] for index in columns[driver.CRITERION]]
     return lists
+
+
+def limit_of(scene: Scene, row: list[float]) -> StepLimit:
+    """Return the limit of the next step from a row of `driver`."""
+    criterion = _criteria(scene)[int(row[driver.CRITERION])]
+    return StepLimit(row[driver.STEP_LIMIT], int(row[driver.LIMITER]), criterion)
+
+
+def _criteria(scene: Scene) -> tuple[str, ...]:
+    return scene.step_bounds.criterion, *CRITERIA[1:]
