@@ -162,6 +162,7 @@ class Runner:
                 self.cpu_before = past["cpu_seconds"][-1]
             else:  # a checkpoint without history: begin one, whose first row has no limiter
                 self.simulation.keep_row()
+                self._record()
             return self._to_end()
 
     @contextmanager

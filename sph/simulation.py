@@ -152,7 +152,7 @@ class Simulation:
 
         Keeps the rows of the history of valid steps for `take_rows`. Raises NumericalError.
         """
-        if self._steps.may_begin:
+        if self._steps.may_begin():
             self._steps.take(until, most)
         else:
             self.advance(until)

@@ -213,10 +213,10 @@ def is_sound(energy, max_density, rates, dt, min_density, min_energy, time) -> b
     return (
         min_density > 0.0
         and min_energy >= 0.0
-        and math.isfinite(energy)
-        and math.isfinite(max_density)
-        and math.isfinite(rates)
-        and math.isfinite(dt)
+        and abs(energy) < math.inf
+        and abs(max_density) < math.inf
+        and abs(rates) < math.inf
+        and abs(dt) < math.inf
         and time + dt > time
     )
 

@@ -40,6 +40,7 @@ class Sweep:
         self.state = state
         self.team = team
         self.dim = (0,) * state.dimension
+        self.items = blocks  # that passes run over
         self.wanted = np.empty(blocks)
         self.models = models  # those of the formulation
         self.neighbours: Neighbours | None = None
@@ -64,4 +65,4 @@ class Sweep:
 
     def run(self, function, models, *arguments) -> None:
         """Call function(first, last, dim, models, neighbours, *arguments) over ranges of blocks."""
-        self.team.run(function, self.wanted.size, self.dim, models, self.neighbours, *arguments)
+        self.team.run(function, self.items, self.dim, models, self.neighbours, *arguments)

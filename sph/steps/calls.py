@@ -32,6 +32,10 @@ _thunks: dict[str, int] = {}  # addresses by native signature
 _engines: list[llvm.ExecutionEngine] = []  # which own the code of the thunks
 
 
+class Unsuitable(Exception):
+    """A call cannot be held in a table."""
+
+
 class Held(NamedTuple):
     """An argument, or an entry of a tuple, whose words a table finds again by name."""
 
@@ -52,7 +56,9 @@ class Table:
         """Add a call of a function that Numba compiled, with arguments or `Held` arguments."""
         signature = tuple(typeof(_plain(one), Purpose.argument) for one in arguments)
         function.compile(signature)  # type: ignore[attr-defined]
-        found = function.overloads[signature]  # type: ignore[attr-defined]
+        found = function.overloads.get(signature)  # type: ignore[attr-defined]
+        if found is None:
+            raise Unsuitable(f"{function} has arguments with defaults")
         described = found.fndesc
         _check_result(described.restype)
         kind = found.target_context.call_conv.get_function_type(
@@ -71,7 +77,7 @@ class Table:
                     self.places.setdefault(name, []).append(len(self._words))
         expected = len(kind.args) - 2  # besides the places of the result and the exception
         if len(self._words) - begin - 1 - RESULTS != expected:
-            raise AssertionError(f"{function}: expected {expected} words of arguments")
+            raise Unsuitable(f"{function}: expected {expected} words of arguments")
 
     def finished(self) -> tuple[np.ndarray, np.ndarray]:
         """Return the words, and for each call (K, 2) the address of its thunk and its first word.
@@ -120,8 +126,10 @@ def _flat(argument: Any) -> Iterator[tuple[str | None, int]]:
             yield None, word
     elif isinstance(argument, float):
         yield None, struct.unpack("q", struct.pack("d", argument))[0]
-    else:
+    elif isinstance(argument, int | np.integer | np.bool_):
         yield None, int(argument)
+    else:
+        raise Unsuitable(f"expected numbers, arrays and tuples of these, not {argument!r:.60}")
 
 
 def address(array: np.ndarray) -> int:
@@ -131,10 +139,10 @@ def address(array: np.ndarray) -> int:
 
 def _check_result(kind: Any) -> None:
     """Check that a result is words in order: a number, or a tuple of numbers."""
-    entries = list(kind.types) if isinstance(kind, types.BaseTuple) else [kind]
+    entries = [*kind] if isinstance(kind, types.BaseTuple) else [kind]  # type: ignore[misc]
     known = types.float64, types.int64, types.none
     if len(entries) > RESULTS or any(one not in known for one in entries):
-        raise AssertionError(f"expected up to {RESULTS} numbers as result, not {kind}")
+        raise Unsuitable(f"expected up to {RESULTS} numbers as result, not {kind}")
 
 
 def _thunks_of(kinds: list[ir.FunctionType]) -> list[int]:

@@ -3,11 +3,11 @@
 `take` makes the same calls in the same order as `Simulation.advance`, by address (`calls`), so its
 own code is one for all scenes. It returns where Python is needed: at `until`, after a number of
 steps or seconds, where lists must be built or widened, and after a step whose sums the watchdog
-might refuse. No flag of fast arithmetic is set, so numbers have the bits of Python's.
+might refuse. No flag of fast arithmetic is set, so numbers have the bits of Python's. Arguments are
+few arrays of numbers, which takes a third of the time to compile.
 """
 
-import math
-from typing import NamedTuple
+from typing import Any
 
 import numpy as np
 from numba import njit
@@ -28,233 +28,212 @@ PAUSED, STALE, WIDER, DOUBTFUL = range(4)
     MAX_DENSITY, MIN_ENERGY, MAX_ENERGY, RATES, DRIFT, INJECTED, HELD, WALL, CPU, MOMENTUM,
 ) = range(19)  # fmt: skip
 
-OPTIONS = {"cache": True, "nogil": True, "error_model": "numpy"}
-
-
-class Plan(NamedTuple):
-    """The calls of a step, and the indices of words that change from step to step.
-
-    The calls are those of the prediction, one for the motion since lists were built, the passes,
-    the correction, and one each for totals, smallest step, change of supports and first contact.
-    """
-
-    calls: np.ndarray  # (K, 2) of `Table.finished`
-    motion: int  # index of the call for the motion
-    widens: bool  # whether the first pass may request wider lists; others do not
-    swaps: np.ndarray  # (passes,) whether the two swapped arrays are exchanged after the pass
-    phases: np.ndarray  # (passes,) entry of `spent`; 0 is that of the leapfrog, 1 that of the sums
-    dt: np.ndarray  # words: the length of the step,
-    reach: np.ndarray  # the reach factor of the lists,
-    next_dt: np.ndarray  # the limit of the next step,
-    first: np.ndarray  # and the addresses of the two swapped arrays
-    second: np.ndarray
-    has_divergence: bool  # whether the change of supports comes from div v
-    clock: np.ndarray  # (2,) address of clock_gettime, and its clock
-
-
-class Bounds(NamedTuple):
-    """Numbers that do not change within a call."""
-
-    until: float
-    skin: float
-    courant: float
-    end: float
-    max_support: float
-    max_drift: float
-    baseline_energy: float
-    baseline_scale: float
-    added: float
-    box_volume: float  # of a box that gas fills; 0 for others
-    step: int  # number of steps before the call
-    longest: float  # seconds after which the call returns
-
-
-class Arrays(NamedTuple):
-    """Arrays that the driver itself reads."""
-
-    wanted: np.ndarray
-    density: np.ndarray
-    position: np.ndarray
-    momentum: np.ndarray  # (D,) of the totals
-    first: np.ndarray  # the two swapped arrays: the first is the support at the beginning
-    second: np.ndarray
-    fences: np.ndarray  # (F, 3) axis, lowest and highest position
-
-
-# Entries of the array `now`, which changes from step to step: time, limit of the next step, energy
-# injected, number of supports limited by max_support, reach factor of the lists, and length and end
-# of the last step.
+# Entries of `now`, which changes from step to step: time, limit of the next step, energy injected,
+# number of supports limited by max_support, reach factor of the lists, and length and end of the
+# last step.
 NOW, LIMIT, GIVEN, LIMITED, REACH, LENGTH, UNTIL = range(7)
+
+# Entries of `fixed`, numbers that do not change within a call. BOX: volume of a box that gas fills,
+# 0 for others; STEP: number of steps before the call; LONGEST: seconds after which to return.
+(
+    STOP, SKIN, COURANT, END, MAX_DRIFT, BASE_ENERGY, BASE_SCALE, ADDED, BOX, STEP, LONGEST,
+) = range(11)  # fmt: skip
+
+# What the result of a call is: energy injected (GIVES), motion since lists were built (MOVES),
+# whether the first pass found all supports (FINDS), number of supports limited by max_support
+# (COUNTS), sums (SUMS), smallest step (BOUNDS), largest change of supports by div v (DIVERGES) or
+# by the last step (CHANGES), first contact (MEETS), whether particles are within fences (FENCES).
+(
+    NOTHING, GIVES, MOVES, FINDS, COUNTS, SUMS, BOUNDS, DIVERGES, CHANGES, MEETS, FENCES,
+) = range(11)  # fmt: skip
+
+# Columns of `calls`: those of `Table.finished`, what follows, whether the two arrays are swapped
+# then, and the phase that ends there, an index in `spent`, or -1.
+THUNK, BEGIN, ACTION, SWAPS, PHASE = range(5)
+
+# Kinds of words that change from step to step: the length of the step, the reach factor of the
+# lists, the limit of the next step, and the addresses of the two arrays that a pass may swap.
+DT, REACHED, NEXT_DT, FIRST, SECOND = range(5)
+
+OPTIONS: dict[str, Any] = {"cache": True, "nogil": True, "error_model": "numpy"}
+# of functions that only `take` calls: without wrappers for calls from Python
+HELPER: dict[str, Any] = {
+    "error_model": "numpy", "no_cpython_wrapper": True, "no_cfunc_wrapper": True,
+}  # fmt: skip
 
 
 @njit(**OPTIONS)
-def take(plan, bounds, arrays, words, numbers, now, rows, spent, is_predicted):
+def take(calls, places, words, numbers, fixed, momentum, now, rows, spent, clock, first):
     """Take up to len(rows) steps. Return (reason, number of steps, swapped).
 
-    words, numbers: the words of the calls, as int64 and float64 in the same memory; spent: seconds
-    by phase; is_predicted: whether the call begins after the prediction of a step, with new lists.
-    swapped: whether the two swapped arrays have changed places. The column WALL of the rows has
-    seconds since the call, CPU is left out. Raises MemoryError.
+    calls: (K, 5) int64; places: (P, 2) kind and index of words; words, numbers: the words as int64
+    and float64, in the same memory; momentum: (D,), part of the sums; spent: seconds by phase;
+    clock: (2,) address and argument of clock_gettime; first: the first call, 0 or, to complete a
+    step after its prediction, the one after MOVES. swapped: whether the two arrays have changed
+    places. The column WALL of the rows has seconds since the call, CPU is left out. Raises
+    MemoryError.
     """
-    calls, passes = plan.calls, plan.motion + 1
-    correction = passes + plan.swaps.size
+    base = words.ctypes.data
     moment = np.empty(2, np.int64)
-    begun = last = _nanoseconds(plan.clock, moment)
+    begun = before = _nanoseconds(clock, moment)
     swapped = False
     steps = 0
-    while steps < rows.shape[0] and (is_predicted or now[NOW] < bounds.until):
-        if not is_predicted:
-            dt, lands = next_step(now[NOW], now[LIMIT], bounds.until)
-            now[LENGTH], now[UNTIL] = dt, (bounds.until if lands else now[NOW] + dt)
-            _set(numbers, plan.dt, dt)
-            now[GIVEN] += _run(calls, 0, plan.motion, words, numbers)
-            moved = _run(calls, plan.motion, passes, words, numbers)
-            grown = numbers[calls[plan.motion, 1] + 2]
-            now[REACH] = 1.0 + bounds.skin - 2.0 * moved
-            if not now[REACH] > grown:
-                return STALE, steps, swapped
-        is_predicted = False
-        _set(numbers, plan.reach, now[REACH])
-        last = _stamp(plan.clock, moment, last, spent, 0)
-        arrays.wanted[:] = 1.0
-        for index in range(plan.swaps.size):
-            _run(calls, passes + index, passes + index + 1, words, numbers)
-            if index == 0 and plan.widens and not _found(arrays.wanted, arrays.density):
-                return WIDER, steps, swapped
-            if plan.swaps[index]:
-                swapped = not swapped
-                _exchange(words, plan.first, plan.second)
-            if index == 0 and plan.widens and bounds.max_support < np.inf:
-                support = arrays.second if swapped else arrays.first
-                now[LIMITED] = _number_of(support, bounds.max_support)
-            last = _stamp(plan.clock, moment, last, spent, plan.phases[index])
-        now[GIVEN] += _run(calls, correction, calls.shape[0] - 4, words, numbers)
-        now[NOW] = now[UNTIL]
-        last = _stamp(plan.clock, moment, last, spent, 0)
+    while steps < rows.shape[0] and (first > 0 or now[NOW] < fixed[STOP]):
         row = rows[steps]
-        _measure(plan, bounds, arrays, words, numbers, now, row)
+        given = 0.0
+        limit, particle, criterion = 0.0, 0, 0
+        is_doubtful = False
+        if first == 0:
+            dt, lands = next_step(now[NOW], now[LIMIT], fixed[STOP])
+            now[LENGTH], now[UNTIL] = dt, (fixed[STOP] if lands else now[NOW] + dt)
+            _set(numbers, places, DT, dt)
+        else:
+            _set(numbers, places, REACHED, now[REACH])
+        for k in range(first, calls.shape[0]):
+            status: Any = call(calls[k, THUNK], base + 8 * calls[k, BEGIN])  # type: ignore
+            if status != 0:
+                raise MemoryError("not enough memory for a time step")
+            at = calls[k, BEGIN] + 1
+            result, action = numbers[at], calls[k, ACTION]
+            if action == GIVES:
+                given += result
+            elif action == MOVES:
+                now[GIVEN] += given
+                given = 0.0
+                now[REACH] = 1.0 + fixed[SKIN] - 2.0 * result
+                if not now[REACH] > numbers[at + 1]:
+                    return STALE, steps, swapped
+                _set(numbers, places, REACHED, now[REACH])
+            elif action == FINDS:
+                if result == 0.0:
+                    return WIDER, steps, swapped
+            elif action == COUNTS:
+                now[LIMITED] = result
+            elif action == SUMS:
+                now[GIVEN] += given
+                now[NOW] = now[UNTIL]
+                for column in range(RATES + 1 - KINETIC):
+                    row[KINETIC + column] = numbers[at + column]
+                for d in range(momentum.size):
+                    row[MOMENTUM + d] = momentum[d]
+            elif action == BOUNDS:
+                limit, particle, criterion = fixed[COURANT] * result, words[at + 1], words[at + 2]
+            elif action in (DIVERGES, CHANGES):
+                is_divergence = action == DIVERGES
+                rate = rate_of_supports(result, is_divergence, momentum.size, now[LENGTH])
+                limit, particle, criterion = restricted(
+                    limit, particle, criterion, rate, words[at + 1], now[LIMIT], fixed[END]
+                )
+                _set(numbers, places, NEXT_DT, limit)
+            elif action == MEETS:
+                if result < 1.0:
+                    limit, particle, criterion = result * limit, words[at + 1], APPROACH
+            elif action == FENCES:
+                is_doubtful = result == 0.0
+            if calls[k, SWAPS] == 1:
+                swapped = not swapped
+                _exchange(words, places)
+            if calls[k, PHASE] >= 0:
+                here = _nanoseconds(clock, moment)
+                spent[calls[k, PHASE]] += 1e-9 * (here - before)
+                before = here
+        first = 0
         steps += 1
-        last = _stamp(plan.clock, moment, last, spent, 1)
-        row[WALL] = 1e-9 * (last - begun)
-        if not _passes_checks(bounds, arrays, bounds.step + steps, row):
+        now[LIMIT] = limit
+        row[TIME], row[STEP_LIMIT] = now[NOW], limit
+        row[LIMITER], row[CRITERION] = particle, criterion
+        row[INJECTED], row[HELD] = now[GIVEN], now[LIMITED]
+        row[DRIFT] = drift_of(
+            row[RELATIVE] + row[INTERNAL], fixed[ADDED], fixed[BASE_ENERGY], fixed[BASE_SCALE]
+        )
+        row[WALL] = 1e-9 * (before - begun)
+        if is_doubtful or not _passes_checks(fixed, fixed[STEP] + steps, row):
             return DOUBTFUL, steps, swapped
-        if row[WALL] > bounds.longest:
+        if row[WALL] > fixed[LONGEST]:
             break
     return PAUSED, steps, swapped
 
 
-@njit(**OPTIONS)
-def _run(calls, first, last, words, numbers):
-    """Make the calls [first, last). Return the sum of their results, or of the first of each."""
-    base = words.ctypes.data
-    total = 0.0
-    for k in range(first, last):
-        if call(calls[k, 0], base + 8 * calls[k, 1]) != 0:
-            raise MemoryError("not enough memory for a time step")
-        total += numbers[calls[k, 1] + 1]
-    return total
-
-
-@njit(**OPTIONS)
-def _set(numbers, places, value):
-    for place in places:
-        numbers[place] = value
-
-
-@njit(**OPTIONS)
-def _exchange(words, first, second):
-    one, other = words[first[0]], words[second[0]]
-    for place in first:
-        words[place] = other
-    for place in second:
-        words[place] = one
-
-
-@njit(**OPTIONS)
+@njit(**HELPER)
 def _nanoseconds(clock, moment):
-    read_clock(clock[0], clock[1], moment.ctypes.data)
+    read_clock(clock[0], clock[1], moment.ctypes.data)  # type: ignore[call-arg]
     return 1_000_000_000 * moment[0] + moment[1]
 
 
-@njit(**OPTIONS)
-def _stamp(clock, moment, last, spent, phase):
-    """Add the time since `last` to a phase, and return the present time in ns."""
-    here = _nanoseconds(clock, moment)
-    spent[phase] += 1e-9 * (here - last)
-    return here
+@njit(**HELPER)
+def _set(numbers, places, kind, value):
+    for index in range(places.shape[0]):
+        if places[index, 0] == kind:
+            numbers[places[index, 1]] = value
+
+
+@njit(**HELPER)
+def _exchange(words, places):
+    """Exchange the addresses of the two arrays that a pass swaps."""
+    first = second = 0
+    for index in range(places.shape[0]):
+        kind, place = places[index]
+        if kind == FIRST:
+            first = words[place]
+        elif kind == SECOND:
+            second = words[place]
+    for index in range(places.shape[0]):
+        kind, place = places[index]
+        if kind == FIRST:
+            words[place] = second
+        elif kind == SECOND:
+            words[place] = first
+
+
+@njit(**HELPER)
+def _passes_checks(fixed, step, row):
+    """Whether the watchdog would accept the sums; False if in doubt."""
+    ratio = row[VOLUME] / fixed[BOX] if fixed[BOX] > 0.0 else 1.0
+    return (
+        is_sound(
+            row[KINETIC] + row[INTERNAL], row[MAX_DENSITY], row[RATES], row[STEP_LIMIT],
+            row[MIN_DENSITY], row[MIN_ENERGY], row[TIME],
+        )
+        and abs(row[DRIFT]) <= fixed[MAX_DRIFT]
+        and abs(ratio) < np.inf
+        and (step < SETTLING or fits_box(ratio))
+    )  # fmt: skip
+
+
+# --- functions that the driver calls by address ---------------------------------------------------
 
 
 @njit(**OPTIONS)
-def _found(wanted, density):
-    """Whether a pass found all supports: no block requests wider lists, no density is negative."""
-    found = True
+def found(wanted, density):
+    """Return 1.0 if no block requests wider lists and no density is negative; else 0.0.
+
+    If so, sets `wanted` to 1.0, as passes expect it.
+    """
+    good = True
     for block in range(wanted.size):
-        found = found and not wanted[block] > 0.0
+        good = good and not wanted[block] > 0.0
     for i in range(density.size):
-        found = found and not density[i] < 0.0
-    return found
+        good = good and not density[i] < 0.0
+    if good:
+        wanted[:] = 1.0
+    return 1.0 if good else 0.0
 
 
 @njit(**OPTIONS)
-def _number_of(support, largest):
-    number = 0
+def count(support, largest):
+    """Return the number of supports of the size `largest`, as a float."""
+    number = 0.0
     for i in range(support.size):
-        number += support[i] == largest
+        number += 1.0 if support[i] == largest else 0.0
     return number
 
 
 @njit(**OPTIONS)
-def _measure(plan, bounds, arrays, words, numbers, now, row):
-    """Write a row, and the limit of the next step: `totals.of`, `step_size.limit`."""
-    calls = plan.calls
-    K = calls.shape[0]
-    _run(calls, K - 4, K - 1, words, numbers)
-    totals, smallest, change, contact = (
-        calls[K - 4, 1] + 1, calls[K - 3, 1] + 1, calls[K - 2, 1] + 1, calls[K - 1, 1] + 1,
-    )  # fmt: skip
-    for column in range(KINETIC, RATES + 1):
-        row[column] = numbers[totals + column - KINETIC]
-    D = arrays.momentum.size
-    for d in range(D):
-        row[MOMENTUM + d] = arrays.momentum[d]
-    energy = row[RELATIVE] + row[INTERNAL] + 0.0
-    row[DRIFT] = drift_of(energy, bounds.added, bounds.baseline_energy, bounds.baseline_scale)
-    rate = rate_of_supports(numbers[change], plan.has_divergence, D, now[LENGTH])
-    limit, particle, criterion = restricted(
-        bounds.courant * numbers[smallest], words[smallest + 1], words[smallest + 2], rate,
-        words[change + 1], now[LIMIT], bounds.end,
-    )  # fmt: skip
-    _set(numbers, plan.next_dt, limit)
-    part = _run(calls, K - 1, K, words, numbers)
-    if part < 1.0:
-        limit, particle, criterion = part * limit, words[contact + 1], APPROACH
-    now[LIMIT] = limit
-    row[TIME] = now[NOW]
-    row[STEP_LIMIT] = limit
-    row[LIMITER] = particle
-    row[CRITERION] = criterion
-    row[INJECTED] = now[GIVEN]
-    row[HELD] = now[LIMITED]
-
-
-@njit(**OPTIONS)
-def _passes_checks(bounds, arrays, step, row):
-    """Whether the watchdog would find nothing; if in doubt, False."""
-    if not is_sound(
-        row[KINETIC] + row[INTERNAL] + 0.0, row[MAX_DENSITY], row[RATES], row[STEP_LIMIT],
-        row[MIN_DENSITY], row[MIN_ENERGY], row[TIME],
-    ):  # fmt: skip
-        return False
-    if not abs(row[DRIFT]) <= bounds.max_drift:
-        return False
-    if bounds.box_volume > 0.0:
-        ratio = row[VOLUME] / bounds.box_volume
-        if not math.isfinite(ratio) or (step >= SETTLING and not fits_box(ratio)):
-            return False
-    for fence in range(arrays.fences.shape[0]):
-        axis = int(arrays.fences[fence, 0])
-        low, high = arrays.fences[fence, 1], arrays.fences[fence, 2]
-        for i in range(arrays.position.shape[1]):
-            if not low <= arrays.position[axis, i] <= high:
-                return False
-    return True
+def fenced(position, fences):
+    """Return 1.0 if all particles are within fences, (F, 3) axis, lowest and highest position."""
+    for k in range(fences.shape[0]):
+        x = position[int(fences[k, 0])]
+        for i in range(x.size):
+            if not fences[k, 1] <= x[i] <= fences[k, 2]:
+                return 0.0
+    return 1.0

@@ -1,0 +1,181 @@
+"""The calls of a step of a simulation, held in memory for the driver."""
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+from numba.extending import is_jitted
+
+from sph import totals
+from sph.integrators import leapfrog, step_size
+from sph.neighbours import search
+from sph.neighbours.approach import first_contact
+from sph.part import IN_PYTHON, Part, Pass
+from sph.scene import Scene
+from sph.steps import driver
+from sph.steps.calls import Held, Table, address, words_of
+
+# The only arrays that a pass may exchange.
+SWAPPED = ("support", "support_before")
+
+# Phases besides those of passes; their order is that of `spent` in the driver.
+PHASES = ("predict, correct", "step size, sums")
+LEAPFROG, SUMS = range(2)
+
+
+def suits(scene: Scene) -> bool:
+    """Whether all that a step of a scene does is compiled."""
+    functions: list = [one.function for one in scene.passes]
+    functions += [f for part in scene.all_parts for one in part.evolved for f in one.rule]
+    swaps = {one.swaps for one in scene.passes} - {None, SWAPPED}
+    wideners = [one for one in scene.passes[1:] if one.widens]
+    in_python = [name for part in scene.all_parts for name in in_python_of(part)]
+    return all(map(is_jitted, functions)) and not (swaps or wideners or in_python)
+
+
+def in_python_of(part: Part) -> list[str]:
+    """Return the names of the methods that Python must call in each step of this part."""
+    own = [name for name in IN_PYTHON if getattr(type(part), name) is not getattr(Part, name)]
+    return [name for name in own if name not in part.idle]
+
+
+class Program:
+    """The calls of a step, in their order in `Simulation.advance`, and their arguments.
+
+    calls, places, words, numbers, momentum: arguments of `driver.take`; after_prediction: index of
+    the first call after the prediction. Raises `Unsuitable` if a call cannot be held.
+    """
+
+    def __init__(self, simulation: Any, phases: list[str], fences: np.ndarray):
+        self._simulation = simulation
+        self._phases, self._fences = phases, fences
+        self._table = Table()
+        self._ends: list[tuple[int, bool, int]] = []  # of each call: action, swaps, phase
+        neighbours = simulation.neighbours()
+        self._kinds = _kinds_of(neighbours)
+        self._held = self._present()
+        self.momentum = np.empty(simulation.scene.dimension)
+        self._dt = Held("dt", 0.0)
+        self._add_prediction()
+        self.after_prediction = len(self._ends)
+        lists = Held("neighbours", neighbours._replace(reach_factor=Held("reach", 1.0)))
+        for one in simulation.scene.passes:
+            self._add_pass(one, lists)
+        self._add_correction()
+        self._add_sums()
+        self.words, calls = self._table.finished()
+        self.numbers = self.words.view(np.float64)
+        self.calls = np.hstack([calls, np.array(self._ends, np.int64)])
+        self._places = self._table.places
+        kinds = enumerate(("dt", "reach", "next_dt", *SWAPPED))
+        found = [(kind, one) for kind, name in kinds for one in self._places.get(name, [])]
+        self.places = np.array(found, np.int64)
+
+    def fits(self) -> bool:
+        """Whether the present lists have the types of those that the calls were made for."""
+        return _kinds_of(self._simulation.neighbours()) == self._kinds
+
+    def refresh(self, has_new_lists: bool) -> None:
+        """Make the words hold the present arrays."""
+        if has_new_lists:
+            words = words_of(self._simulation.neighbours())
+            for place in self._places["neighbours"]:
+                self.words[place : place + len(words)] = words
+        present = self._present()
+        for name, array in present.items():
+            if self._held[name] is not array and name in self._places:
+                self.words[self._places[name]] = address(array)
+        self._held = present
+
+    def note_swap(self) -> None:
+        """Note that the driver has exchanged the two arrays in the words."""
+        first, second = SWAPPED
+        held = self._held
+        held[first], held[second] = held[second], held[first]
+
+    def _present(self) -> dict[str, np.ndarray]:
+        """Return the arrays that steps replace, by name."""
+        s, p = self._simulation, self._simulation.particles
+        found = {field.name: getattr(p, field.name) for field in p.fields}
+        found["list_position"], found["list_support"], _ = s.search.origin
+        return found
+
+    # --- the calls, in order
+
+    def _add(self, action: int, function, *arguments, swaps: bool = False, phase: int = -1) -> None:
+        self._table.add(function, *arguments)
+        self._ends.append((action, swaps, phase))
+
+    def _of(self, *names: str | None) -> list[Held | None]:
+        """Return the arrays of fields, None for those that the scene lacks."""
+        held = self._held
+        return [Held(name, held[name]) if name in held else None for name in names]
+
+    def _add_prediction(self) -> None:
+        moved = self._of("position", "velocity", "acceleration", "predicted_velocity")
+        self._add(driver.NOTHING, leapfrog._move, self._dt, *moved)
+        for one in self._simulation.evolved:
+            names = (one.value, one.rate, "mass", one.predicted)
+            self._add(driver.GIVES, one.rule.predict, self._dt, *self._of(*names))
+        lists = self._of("position", "support", "list_position", "list_support")
+        self._add(driver.MOVES, search._motion, *lists, phase=LEAPFROG)
+
+    def _add_pass(self, one: Pass, lists: Held) -> None:
+        s = self._simulation
+        phase, swaps = self._phases.index(one.phase), one.swaps is not None
+        arguments = [s.sweep.dim, s.sweep.models, lists, *self._of(*one.arrays)]
+        arguments += [s.sweep.wanted] * one.widens + [self._dt] * one.takes_step
+        if not one.widens:
+            self._add(
+                driver.NOTHING, one.function, 0, s.sweep.items, *arguments, swaps=swaps, phase=phase
+            )
+            return
+        self._add(driver.NOTHING, one.function, 0, s.sweep.items, *arguments)
+        wanted = s.sweep.wanted, *self._of("density")
+        self._add(driver.FINDS, driver.found, *wanted, swaps=swaps, phase=phase)
+        if s.scene.max_support < np.inf:
+            self._add(driver.COUNTS, driver.count, *self._of("support"), s.scene.max_support)
+
+    def _add_correction(self) -> None:
+        rules = [("velocity", "acceleration", leapfrog._straight_correct)]
+        rules += [(one.value, one.rate, one.rule.correct) for one in self._simulation.evolved]
+        for value, rate, rule in rules:
+            arrays = self._of(value, rate, "mass")
+            self._add(driver.GIVES, rule, self._dt, *arrays, phase=LEAPFROG)
+
+    def _add_sums(self) -> None:
+        scene = self._simulation.scene
+        bounds, domain, of = scene.step_bounds, scene.domain, self._of
+        rates, moved = of("acceleration", "energy_rate"), of("position", "velocity", "acceleration")
+        self._add(
+            driver.SUMS, totals.sums, *of("mass", "velocity", "internal_energy", "density"), *rates,
+            scene.keeps_momentum, self.momentum,
+        )  # fmt: skip
+        self._add(
+            driver.BOUNDS, step_size._smallest,
+            *of("support", "signal_speed", "internal_energy", "energy_rate"),
+            *of("acceleration" if bounds.acceleration else None, "id"), bounds.energy,
+        )  # fmt: skip
+        if "div_v" in self._held:
+            self._add(driver.DIVERGES, step_size._fastest_change, *of("div_v", "id"))
+        else:
+            arrays = of("support", "support_before", "id")
+            self._add(driver.CHANGES, step_size._largest_change, *arrays)
+        self._add(
+            driver.MEETS, first_contact, *moved, *of("support", "id"), domain.images,
+            domain.longest_reach, Held("next_dt", 0.0), 2.0 / 3.0 * bounds.courant, phase=SUMS,
+        )  # fmt: skip
+        if self._fences.size:
+            self._add(driver.FENCES, driver.fenced, *of("position"), self._fences)
+
+
+def _kinds_of(entries: tuple) -> list[np.dtype]:
+    return [one.dtype for one in _arrays_in(entries)]
+
+
+def _arrays_in(entries: tuple) -> Iterator[np.ndarray]:
+    for one in entries:
+        if isinstance(one, np.ndarray):
+            yield one
+        elif isinstance(one, tuple):
+            yield from _arrays_in(one)
