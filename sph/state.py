@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from sph.threads import ALONE, CHUNK, Team
+
 
 class Public(NamedTuple):
     """A field in the public part of a checkpoint: name, exponents of its unit, description."""
@@ -135,6 +137,12 @@ class State:
         """Return the array of that name, or None if no part of the scene declares it."""
         return self.__dict__.get(name)
 
+    def rows(self, name: str) -> np.ndarray:
+        """Return a view of the array of that name, (rows, N): one row for a scalar."""
+        array = getattr(self, name)
+        assert array.flags.c_contiguous, name  # `reshape` would return a copy
+        return array.reshape(-1, self.number)
+
     def declare(self, fields: Iterable[Field]) -> list[str]:
         """Keep exactly these fields; add missing fields as zeros and return their names."""
         fields, known = tuple(fields), {field.name for field in self.fields}
@@ -160,7 +168,17 @@ class State:
         """Return a copy in the order of IDs, for comparing runs and for plots."""
         return self.subset(np.argsort(self.id, kind="stable"))
 
-    def reorder(self, order: np.ndarray, names: Iterable[str]) -> None:
+    def reorder(self, order: np.ndarray, names: Iterable[str], team: Team = ALONE) -> None:
         """Reorder the arrays `names` in memory by `order`, (N,) indices."""
         for name in names:
-            setattr(self, name, getattr(self, name).take(order, axis=-1))
+            old = getattr(self, name)
+            if team.threads == 1 or self.number <= CHUNK:
+                new = old.take(order, axis=-1)
+            else:
+                new = np.empty_like(old)
+                team.run(_take, self.number, old, order, new, smallest=CHUNK)
+            setattr(self, name, new)
+
+
+def _take(first: int, last: int, old: np.ndarray, order: np.ndarray, new: np.ndarray) -> None:
+    new[..., first:last] = old.take(order[first:last], axis=-1)

@@ -7,6 +7,7 @@ import numpy as np
 from numba import njit
 
 from sph.compiled import COMPILED
+from sph.threads import ALONE, Team
 
 
 class Totals(NamedTuple):
@@ -77,30 +78,56 @@ class Budget(NamedTuple):
     baseline: Baseline
 
 
-def of(state, parts, keeps_momentum) -> Totals:
+def of(state, parts, keeps_momentum, team: Team = ALONE) -> Totals:
     """Return the totals of a state. parts: parts whose energies belong to the total.
 
     keeps_momentum: (D,), 1.0 for axes along which momentum is conserved, 0.0 for others.
     """
     s = state
-    kinetic, relative, internal, *others = _totals(
-        s.mass, s.velocity, s.internal_energy, s.density, s.acceleration, s.energy_rate,
-        keeps_momentum,
+    chunks = team.chunks(
+        _totals, s.number, s.mass, s.velocity, s.internal_energy, s.density, s.acceleration,
+        s.energy_rate, keeps_momentum,
     )  # fmt: skip
+    found = chunks[0] if len(chunks) == 1 else _combined(chunks, keeps_momentum)
+    _, kinetic, relative, internal, *others = found
     energies = {
         name: float(s.mass @ each) for part in parts for name, each in part.energies(s).items()
     }
     return Totals(kinetic, relative, internal, energies, *others)
 
 
+def _combined(chunks, keeps_momentum):
+    """Return the totals of all chunks in the form of `_totals`."""
+    columns = map(np.array, zip(*chunks, strict=True))
+    mass, kinetic, relative, internal, momentum, volume, low, high, least, most, rates = columns
+    # sums that overflow are found by the watchdog
+    with np.errstate(invalid="ignore", over="ignore"):
+        whole = mass.sum()
+        # sum m (v - bulk)^2 of a chunk is that about its own mean, and M (mean - bulk)^2
+        means = keeps_momentum * momentum / mass[:, None]
+        bulk = keeps_momentum * momentum.sum(axis=0) / whole
+        apart = 0.5 * (mass @ (means - bulk) ** 2).sum()
+        return (
+            float(whole), float(kinetic.sum()), float(relative.sum() + apart),
+            float(internal.sum()), momentum.sum(axis=0), float(volume.sum()), float(low.min()),
+            float(high.max()), float(least.min()), float(most.max()), float(rates.sum()),
+        )  # fmt: skip
+
+
 @njit(**COMPILED)
-def _totals(mass, velocity, energy, density, acceleration, energy_rate, keeps_momentum):
-    D, n = velocity.shape
+def _totals(
+    first, last, mass, velocity, energy, density, acceleration, energy_rate, keeps_momentum
+):  # fmt: skip
+    """Return the mass and the totals of particles [first, last), in the order of `Totals`.
+
+    The kinetic energy without bulk motion is relative to the mean velocity of these particles.
+    """
+    D = velocity.shape[0]
     momentum = np.zeros(D)
     kinetic = relative = internal = volume = rates = all_mass = 0.0
     lowest_density = lowest_energy = np.inf
     highest_density = highest_energy = -np.inf
-    for i in range(n):
+    for i in range(np.uint64(first), np.uint64(last)):
         all_mass += mass[i]
         internal += mass[i] * energy[i]
         volume += mass[i] / density[i]
@@ -111,7 +138,7 @@ def _totals(mass, velocity, energy, density, acceleration, energy_rate, keeps_mo
         highest_density = max(highest_density, density[i])
     for d in range(D):
         along = squares = 0.0
-        for i in range(n):
+        for i in range(np.uint64(first), np.uint64(last)):
             along += mass[i] * velocity[d, i]
             squares += mass[i] * velocity[d, i] ** 2
             rates += acceleration[d, i]
@@ -120,10 +147,10 @@ def _totals(mass, velocity, energy, density, acceleration, energy_rate, keeps_mo
         # not a difference of two sums, which would lose all digits at very large Mach numbers
         bulk = keeps_momentum[d] * along / all_mass
         squares = 0.0
-        for i in range(n):
+        for i in range(np.uint64(first), np.uint64(last)):
             squares += mass[i] * (velocity[d, i] - bulk) ** 2
         relative += 0.5 * squares
     return (
-        kinetic, relative, internal, momentum, volume, lowest_density, highest_density,
+        all_mass, kinetic, relative, internal, momentum, volume, lowest_density, highest_density,
         lowest_energy, highest_energy, rates,
     )  # fmt: skip
