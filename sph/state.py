@@ -95,9 +95,13 @@ class State:
     """
 
     def __init__(self, fields: Iterable[Field], arrays: Mapping[str, np.ndarray]):
-        """Create a state with those `fields` that `arrays` contains, in the order of `fields`."""
+        """Create a state with those `fields` that `arrays` contains, in the order of `fields`.
+
+        The arrays are not copied and must be contiguous.
+        """
         self.fields = tuple(field for field in fields if field.name in arrays)
         for field in self.fields:
+            assert arrays[field.name].flags.c_contiguous, field.name  # for `rows`
             setattr(self, field.name, arrays[field.name])
 
     if TYPE_CHECKING:  # an attribute for each field; parts declare the fields
@@ -139,9 +143,13 @@ class State:
 
     def rows(self, name: str) -> np.ndarray:
         """Return a view of the array of that name, (rows, N): one row for a scalar."""
-        array = getattr(self, name)
-        assert array.flags.c_contiguous, name  # `reshape` would return a copy
-        return array.reshape(-1, self.number)
+        return getattr(self, name).reshape(-1, self.number)
+
+    def total(self, values: np.ndarray, team: Team = ALONE) -> float:
+        """Return the sum of mass times `values`, (N,)."""
+        # A chunk is so short that BLAS does not share it between threads of its own, whose number
+        # depends on the machine.
+        return sum(team.chunks(lambda a, b: float(self.mass[a:b] @ values[a:b]), self.number))
 
     def declare(self, fields: Iterable[Field]) -> list[str]:
         """Keep exactly these fields; add missing fields as zeros and return their names."""

@@ -16,8 +16,9 @@ from typing import Any
 SMALLEST_RANGE = 256
 
 # Number of particles in a chunk. Every sum over particles is a sum over each chunk, and then over
-# chunks in order. A loop over a chunk takes 20 to 200 microseconds.
-CHUNK = 16384
+# chunks in order. A loop over a chunk takes 10 to 100 microseconds. At most 10000, above which BLAS
+# shares a product between threads of its own (`State.total`).
+CHUNK = 8192
 
 
 def available_processors() -> int:

@@ -84,46 +84,48 @@ def of(state, parts, keeps_momentum, team: Team = ALONE) -> Totals:
     keeps_momentum: (D,), 1.0 for axes along which momentum is conserved, 0.0 for others.
     """
     s = state
-    chunks = team.chunks(
-        _totals, s.number, s.mass, s.velocity, s.internal_energy, s.density, s.acceleration,
-        s.energy_rate, keeps_momentum,
-    )  # fmt: skip
+    fields = s.mass, s.velocity, s.internal_energy, s.density, s.acceleration, s.energy_rate
+
+    def of_range(first, last):
+        momentum = np.empty(s.dimension)
+        return momentum, *sums(first, last, *fields, keeps_momentum, momentum)
+
+    chunks = team.chunks(of_range, s.number)
     found = chunks[0] if len(chunks) == 1 else _combined(chunks, keeps_momentum)
-    _, kinetic, relative, internal, *others = found
+    momentum, kinetic, relative, internal, *others, _ = found
     energies = {
-        name: float(s.mass @ each) for part in parts for name, each in part.energies(s).items()
+        name: s.total(each, team) for part in parts for name, each in part.energies(s).items()
     }
-    return Totals(kinetic, relative, internal, energies, *others)
+    return Totals(kinetic, relative, internal, energies, momentum, *others)
 
 
 def _combined(chunks, keeps_momentum):
-    """Return the totals of all chunks in the form of `_totals`."""
+    """Return (momentum, results of `sums`) of all particles from those of the chunks."""
     columns = map(np.array, zip(*chunks, strict=True))
-    mass, kinetic, relative, internal, momentum, volume, low, high, least, most, rates = columns
-    # sums that overflow are found by the watchdog
-    with np.errstate(invalid="ignore", over="ignore"):
-        whole = mass.sum()
+    momentum, kinetic, relative, internal, volume, low, high, least, most, rates, mass = columns
+    with np.errstate(invalid="ignore", over="ignore"):  # for the watchdog to find
         # sum m (v - bulk)^2 of a chunk is that about its own mean, and M (mean - bulk)^2
         means = keeps_momentum * momentum / mass[:, None]
-        bulk = keeps_momentum * momentum.sum(axis=0) / whole
-        apart = 0.5 * (mass @ (means - bulk) ** 2).sum()
-        return (
-            float(whole), float(kinetic.sum()), float(relative.sum() + apart),
-            float(internal.sum()), momentum.sum(axis=0), float(volume.sum()), float(low.min()),
-            float(high.max()), float(least.min()), float(most.max()), float(rates.sum()),
+        bulk = keeps_momentum * momentum.sum(axis=0) / mass.sum()
+        apart = 0.5 * (mass[:, None] * (means - bulk) ** 2).sum()
+        numbers = (
+            kinetic.sum(), relative.sum() + apart, internal.sum(), volume.sum(), low.min(),
+            high.max(), least.min(), most.max(), rates.sum(), mass.sum(),
         )  # fmt: skip
+    return momentum.sum(axis=0), *map(float, numbers)
 
 
 @njit(**COMPILED)
-def _totals(
-    first, last, mass, velocity, energy, density, acceleration, energy_rate, keeps_momentum
+def sums(
+    first, last, mass, velocity, energy, density, acceleration, energy_rate, keeps_momentum,
+    momentum,
 ):  # fmt: skip
-    """Return the mass and the totals of particles [first, last), in the order of `Totals`.
+    """Return the numbers of `Totals` except `energies`, and the mass, of particles [first, last).
 
-    The kinetic energy without bulk motion is relative to the mean velocity of these particles.
+    Sets momentum, (D,). The kinetic energy without bulk motion is relative to the mean velocity of
+    these particles.
     """
     D = velocity.shape[0]
-    momentum = np.zeros(D)
     kinetic = relative = internal = volume = rates = all_mass = 0.0
     lowest_density = lowest_energy = np.inf
     highest_density = highest_energy = -np.inf
@@ -151,6 +153,6 @@ def _totals(
             squares += mass[i] * (velocity[d, i] - bulk) ** 2
         relative += 0.5 * squares
     return (
-        all_mass, kinetic, relative, internal, momentum, volume, lowest_density, highest_density,
-        lowest_energy, highest_energy, rates,
+        kinetic, relative, internal, volume, lowest_density, highest_density, lowest_energy,
+        highest_energy, rates, all_mass,
     )  # fmt: skip

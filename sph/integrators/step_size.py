@@ -73,9 +73,9 @@ class Past(NamedTuple):
     limit: float
 
 
-# Each function below considers particles [first, last) and returns (value, ID, ...) of the smallest
-# value, and of the lowest ID among equal values. The smallest result of several ranges is that of
-# all their particles. Unsigned indices: see leapfrog.py.
+# Each function below considers particles [first, last) and returns (value, ID, ...) of the extreme
+# value, and of the lowest ID among equal values. Results of ranges thus combine to that of all
+# particles. Unsigned indices: see leapfrog.py.
 
 
 @njit(**COMPILED)
@@ -117,26 +117,26 @@ def _smallest(
 
 @njit(**COMPILED)
 def _largest_change(first, last, support, before, identity):
-    """Return minus the largest relative change of H in either direction, and the particle's ID."""
-    least = 0.0
+    """Return the largest relative change of H in either direction, and the particle's ID."""
+    largest = 0.0
     particle = 0
     for i in range(np.uint64(first), np.uint64(last)):
-        change = -abs(support[i] - before[i]) / min(support[i], before[i])
-        if change < least or (change == least and identity[i] < particle):
-            least, particle = change, identity[i]
-    return least, particle
+        change = abs(support[i] - before[i]) / min(support[i], before[i])
+        if change > largest or (change == largest and identity[i] < particle):
+            largest, particle = change, identity[i]
+    return largest, particle
 
 
 @njit(**COMPILED)
 def _fastest_change(first, last, divergence, identity):
-    """Return minus the largest |div v|, and the particle's ID."""
-    least = 0.0
+    """Return the largest |div v|, and the particle's ID."""
+    largest = 0.0
     particle = 0
     for i in range(np.uint64(first), np.uint64(last)):
-        rate = -abs(divergence[i])
-        if rate < least or (rate == least and identity[i] < particle):
-            least, particle = rate, identity[i]
-    return least, particle
+        rate = abs(divergence[i])
+        if rate > largest or (rate == largest and identity[i] < particle):
+            largest, particle = rate, identity[i]
+    return largest, particle
 
 
 def limit(
@@ -175,16 +175,21 @@ def before_contact(limit: StepLimit, bounds: Bounds, particles: State, domain) -
     return StepLimit(part * limit.dt, int(particle), "approach") if part < 1.0 else limit
 
 
+def _largest(found: list[tuple[float, int]]) -> tuple[float, int]:
+    """Return the pair (value, ID) of the largest value, and of the lowest ID among equal values."""
+    return found[0] if len(found) == 1 else min(found, key=lambda pair: (-pair[0], pair[1]))
+
+
 def _rate_of_supports(state: State, past: Past | None, team: Team) -> tuple[float, int]:
     """Return the largest |dH/dt|/H, from div v if available, and the particle's ID."""
     divergence = state.get("div_v")
     if divergence is not None:
-        rate, particle = min(team.chunks(_fastest_change, state.number, divergence, state.id))
-        return -rate / state.dimension, particle
+        rate, particle = _largest(team.chunks(_fastest_change, state.number, divergence, state.id))
+        return rate / state.dimension, particle
     if past is None:
         return 0.0, 0
     supports = state.support, state.support_before
-    change, particle = min(team.chunks(_largest_change, state.number, *supports, state.id))
+    change, particle = _largest(team.chunks(_largest_change, state.number, *supports, state.id))
     # smaller changes cannot exceed SUPPORT_CHANGE in a step; they may come from the iteration of H,
     # which continues in steps of any length
-    return (-change / past.dt if -change > SUPPORT_CHANGE / GROWTH else 0.0), particle
+    return (change / past.dt if change > SUPPORT_CHANGE / GROWTH else 0.0), particle

@@ -17,7 +17,7 @@ from sph.threads import CHUNK, SMALLEST_RANGE, Team
 BLOCK = 8  # particles per block; 4 and 16 were 20-40 % slower in 3-D (density, rates and lists)
 
 # Smallest number of particles that all threads split together; below, a thread is as fast.
-LARGE = 8 * CHUNK
+LARGE = 16 * CHUNK
 SAMPLE = 4096  # number of particles that bound the median
 
 

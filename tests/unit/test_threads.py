@@ -1,6 +1,9 @@
 """Loops over particles that threads share: no bit may depend on the number of threads."""
 
 import math
+import os
+import subprocess
+import sys
 import time
 
 import numpy as np
@@ -242,6 +245,23 @@ def test_equal_steps_name_lowest_id_of_all_chunks():
     assert step_size.limit(free, state, (), None).particle == 1
     state.div_v[:] = -100.0
     assert step_size.limit(free, state, (), None)[1:] == (1, "support")
+
+
+def test_sum_does_not_depend_on_threads_of_blas():
+    """Products of more than 10000 numbers round differently on one and two threads of OpenBLAS."""
+    program = (
+        "import numpy as np; from sph.state import COMMON, State; "
+        "r = np.random.default_rng(1); n = 100000; "
+        "print(State(COMMON, {'mass': r.random(n)}).total(r.random(n)).hex())"
+    )
+    found = {
+        subprocess.run(
+            [sys.executable, "-c", program], env=os.environ | {"OPENBLAS_NUM_THREADS": number},
+            capture_output=True, text=True, check=True, timeout=300,
+        ).stdout
+        for number in ("1", "2", "3")
+    }  # fmt: skip
+    assert len(found) == 1
 
 
 # --- the order ----------------------------------------------------------------------------------
