@@ -8,6 +8,7 @@ from numba import njit
 from numba.extending import register_jitable
 
 from sph.compiled import COMPILED
+from sph.threads import ALONE, Team
 
 
 class Totals(NamedTuple):
@@ -69,6 +70,7 @@ class Baseline(NamedTuple):
 
 @register_jitable
 def drift_of(energy: float, added: float, initial: float, scale: float) -> float:
+    """Return the drift of `Baseline.drift`; compiled steps (`sph.steps`) call this function too."""
     change = energy - added - initial
     if scale > 0.0:
         return change / scale
@@ -83,31 +85,58 @@ class Budget(NamedTuple):
     baseline: Baseline
 
 
-def of(state, parts, keeps_momentum) -> Totals:
+def of(state, parts, keeps_momentum, team: Team = ALONE) -> Totals:
     """Return the totals of a state. parts: parts whose energies belong to the total.
 
     keeps_momentum: (D,), 1.0 for axes along which momentum is conserved, 0.0 for others.
     """
     s = state
-    momentum = np.empty(s.dimension)
-    kinetic, relative, internal, *others = sums(
-        s.mass, s.velocity, s.internal_energy, s.density, s.acceleration, s.energy_rate,
-        keeps_momentum, momentum,
-    )  # fmt: skip
+    fields = s.mass, s.velocity, s.internal_energy, s.density, s.acceleration, s.energy_rate
+
+    def of_range(first, last):
+        momentum = np.empty(s.dimension)
+        return momentum, *sums(first, last, *fields, keeps_momentum, momentum)
+
+    chunks = team.chunks(of_range, s.number)
+    found = chunks[0] if len(chunks) == 1 else _combined(chunks, keeps_momentum)
+    momentum, kinetic, relative, internal, *others, _ = found
     energies = {
-        name: float(s.mass @ each) for part in parts for name, each in part.energies(s).items()
+        name: s.total(each, team) for part in parts for name, each in part.energies(s).items()
     }
     return Totals(kinetic, relative, internal, energies, momentum, *others)
 
 
+def _combined(chunks, keeps_momentum):
+    """Return (momentum, results of `sums`) of all particles from those of the chunks."""
+    columns = map(np.array, zip(*chunks, strict=True))
+    momentum, kinetic, relative, internal, volume, low, high, least, most, rates, mass = columns
+    with np.errstate(invalid="ignore", over="ignore"):  # for the watchdog to find
+        # sum m (v - bulk)^2 of a chunk is that about its own mean, and M (mean - bulk)^2
+        means = keeps_momentum * momentum / mass[:, None]
+        bulk = keeps_momentum * momentum.sum(axis=0) / mass.sum()
+        apart = 0.5 * (mass[:, None] * (means - bulk) ** 2).sum()
+        numbers = (
+            kinetic.sum(), relative.sum() + apart, internal.sum(), volume.sum(), low.min(),
+            high.max(), least.min(), most.max(), rates.sum(), mass.sum(),
+        )  # fmt: skip
+    return momentum.sum(axis=0), *map(float, numbers)
+
+
 @njit(**COMPILED)
-def sums(mass, velocity, energy, density, acceleration, energy_rate, keeps_momentum, momentum):
-    """Return the numbers of `Totals` except `energies` and momentum, which is written, (D,)."""
-    D, n = velocity.shape
+def sums(
+    first, last, mass, velocity, energy, density, acceleration, energy_rate, keeps_momentum,
+    momentum,
+):  # fmt: skip
+    """Return the numbers of `Totals` except `energies`, and the mass, of particles [first, last).
+
+    Sets momentum, (D,). The kinetic energy without bulk motion is relative to the mean velocity of
+    these particles.
+    """
+    D = velocity.shape[0]
     kinetic = relative = internal = volume = rates = all_mass = 0.0
     lowest_density = lowest_energy = np.inf
     highest_density = highest_energy = -np.inf
-    for i in range(n):
+    for i in range(np.uint64(first), np.uint64(last)):
         all_mass += mass[i]
         internal += mass[i] * energy[i]
         volume += mass[i] / density[i]
@@ -118,7 +147,7 @@ def sums(mass, velocity, energy, density, acceleration, energy_rate, keeps_momen
         highest_density = max(highest_density, density[i])
     for d in range(D):
         along = squares = 0.0
-        for i in range(n):
+        for i in range(np.uint64(first), np.uint64(last)):
             along += mass[i] * velocity[d, i]
             squares += mass[i] * velocity[d, i] ** 2
             rates += acceleration[d, i]
@@ -127,10 +156,10 @@ def sums(mass, velocity, energy, density, acceleration, energy_rate, keeps_momen
         # not a difference of two sums, which would lose all digits at very large Mach numbers
         bulk = keeps_momentum[d] * along / all_mass
         squares = 0.0
-        for i in range(n):
+        for i in range(np.uint64(first), np.uint64(last)):
             squares += mass[i] * (velocity[d, i] - bulk) ** 2
         relative += 0.5 * squares
     return (
-        kinetic, relative, internal, volume, lowest_density, highest_density,
-        lowest_energy, highest_energy, rates,
+        kinetic, relative, internal, volume, lowest_density, highest_density, lowest_energy,
+        highest_energy, rates, all_mass,
     )  # fmt: skip

@@ -1,8 +1,9 @@
 """Compiled steps: several time steps of a small scene in one call (`driver.take`).
 
 A step of some hundred particles costs Python more time than arithmetic. Compiled steps serve scenes
-whose passes run in the calling thread and whose parts do nothing in Python during a step. Other
-scenes take one step after another by `Simulation.advance`, which has the same results.
+of one chunk of particles, whose passes run in the calling thread, and whose parts do nothing in
+Python during a step. Other scenes take one step after another by `Simulation.advance`, which has
+the same results.
 """
 
 import ctypes
@@ -17,6 +18,7 @@ from sph.errors import NumericalError
 from sph.steps import driver, rows
 from sph.steps.calls import Unsuitable
 from sph.steps.program import PHASES, SWAPPED, Program, suits
+from sph.threads import CHUNK
 
 MOST = 512  # steps whose rows are kept as numbers
 
@@ -54,7 +56,9 @@ class Steps:
     def may_begin(self) -> bool:
         """Return whether the next step may be a compiled one."""
         s = self._simulation
-        if not self._suits or s.steps_here < ORDINARY or s.team.shares(s.sweep.items):
+        if not self._suits or s.steps_here < ORDINARY:
+            return False
+        if s.team.shares(s.sweep.items) or s.particles.number > CHUNK:
             return False
         try:
             self._prepare()

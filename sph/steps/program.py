@@ -56,6 +56,7 @@ class Program:
         self._held = self._present()
         self.momentum = np.empty(simulation.scene.dimension)
         self._dt = Held("dt", 0.0)
+        self._all = (0, simulation.particles.number)  # the range of particles
         self._add_prediction()
         self.after_prediction = len(self._ends)
         lists = Held("neighbours", neighbours._replace(reach_factor=Held("reach", 1.0)))
@@ -111,12 +112,18 @@ class Program:
         held = self._held
         return [Held(name, held[name]) if name in held else None for name in names]
 
+    def _rows(self, *names: str) -> list[Held]:
+        """Return the arrays of fields in the form of `State.rows`, which the rules take."""
+        return [Held(name, self._simulation.particles.rows(name)) for name in names]
+
     def _add_prediction(self) -> None:
         moved = self._of("position", "velocity", "acceleration", "predicted_velocity")
-        self._add(driver.NOTHING, leapfrog._move, self._dt, *moved)
+        self._add(driver.NOTHING, leapfrog._move, *self._all, self._dt, *moved)
+        (mass,) = self._of("mass")
         for one in self._simulation.evolved:
-            names = (one.value, one.rate, "mass", one.predicted)
-            self._add(driver.GIVES, one.rule.predict, self._dt, *self._of(*names))
+            value, rate, predicted = self._rows(one.value, one.rate, one.predicted)
+            arrays = value, rate, mass, predicted
+            self._add(driver.GIVES, one.rule.predict, *self._all, self._dt, *arrays)
         lists = self._of("position", "support", "list_position", "list_support")
         self._add(driver.MOVES, search._motion, *lists, phase=LEAPFROG)
 
@@ -137,30 +144,33 @@ class Program:
             self._add(driver.COUNTS, driver.count, *self._of("support"), s.scene.max_support)
 
     def _add_correction(self) -> None:
+        (mass,) = self._of("mass")
         rules = [("velocity", "acceleration", leapfrog._straight_correct)]
         rules += [(one.value, one.rate, one.rule.correct) for one in self._simulation.evolved]
         for value, rate, rule in rules:
-            arrays = self._of(value, rate, "mass")
-            self._add(driver.GIVES, rule, self._dt, *arrays, phase=LEAPFROG)
+            arrays = *self._rows(value, rate), mass
+            self._add(driver.GIVES, rule, *self._all, self._dt, *arrays, phase=LEAPFROG)
 
     def _add_sums(self) -> None:
         scene = self._simulation.scene
         bounds, domain, of = scene.step_bounds, scene.domain, self._of
         rates, moved = of("acceleration", "energy_rate"), of("position", "velocity", "acceleration")
         self._add(
-            driver.SUMS, totals.sums, *of("mass", "velocity", "internal_energy", "density"), *rates,
-            scene.keeps_momentum, self.momentum,
+            driver.SUMS, totals.sums, *self._all,
+            *of("mass", "velocity", "internal_energy", "density"), *rates, scene.keeps_momentum,
+            self.momentum,
         )  # fmt: skip
         self._add(
-            driver.BOUNDS, step_size._smallest,
+            driver.BOUNDS, step_size._smallest, *self._all,
             *of("support", "signal_speed", "internal_energy", "energy_rate"),
             *of("acceleration" if bounds.acceleration else None, "id"), bounds.energy,
         )  # fmt: skip
         if "div_v" in self._held:
-            self._add(driver.DIVERGES, step_size._fastest_change, *of("div_v", "id"))
+            arrays = of("div_v", "id")
+            self._add(driver.DIVERGES, step_size._fastest_change, *self._all, *arrays)
         else:
             arrays = of("support", "support_before", "id")
-            self._add(driver.CHANGES, step_size._largest_change, *arrays)
+            self._add(driver.CHANGES, step_size._largest_change, *self._all, *arrays)
         self._add(
             driver.MEETS, first_contact, *moved, *of("support", "id"), domain.images,
             domain.longest_reach, Held("next_dt", 0.0), 2.0 / 3.0 * bounds.courant, phase=SUMS,
