@@ -90,7 +90,7 @@ class Simulation:
         self.watchdog.check_range(self)
         resolution.check_extent(self)
         leapfrog.keep(self.particles, self.evolved)
-        self.build_lists(dt=0.0, guess=True)
+        self._build_lists(dt=0.0, guess=True)
         self.sweep.is_start = True
         for one in self.scene.passes:
             if one.at_start:
@@ -145,6 +145,7 @@ class Simulation:
             self.energy_injected += leapfrog.predict(p, self.evolved, dt, self.team)
             for part in self.scene.all_parts:
                 part.split_predicted(p, dt / 2)
+        self.renew_lists(dt)
         self.complete(dt, until if lands else self.time + dt)
 
     def proceed(self, until: float, most: int) -> None:
@@ -169,14 +170,18 @@ class Simulation:
         kept, self.rows = self.rows, []
         return kept
 
-    def complete(self, dt: float, end: float) -> None:
-        """Do what follows the prediction in a step of length dt, which ends at the time `end`."""
-        p, allowed = self.particles, self.limit.dt
-        self.sweep.dt = dt
+    def renew_lists(self, dt: float) -> None:
+        """Build the lists of a step of length dt if the old ones do not serve it."""
+        p = self.particles
         with self.clock.phase("predict, correct"):
             stale = self.search.stale(p.position, p.support)
         if stale:
-            self.build_lists(dt)
+            self._build_lists(dt)
+
+    def complete(self, dt: float, end: float) -> None:
+        """Do what follows the lists in a step of length dt, which ends at the time `end`."""
+        p, allowed = self.particles, self.limit.dt
+        self.sweep.dt = dt
         for one in self.scene.passes:
             self._make(one)
         with self.clock.phase("predict, correct"):
@@ -230,7 +235,7 @@ class Simulation:
 
     # --- the parts of a step ---
 
-    def build_lists(self, dt: float, guess: bool = False) -> None:
+    def _build_lists(self, dt: float, guess: bool = False) -> None:
         """Reorder the particles and build the candidate lists."""
         p = self.particles
         self.list_builds += 1

@@ -76,14 +76,17 @@ class Steps:
         now = np.array([s.time, s.limit.dt, s.energy_injected, s.held_supports, 0.0, 0.0, 0.0])
         begun, first, end = time.perf_counter(), 0, self._filled + most
         while True:
+            step = s.step
             self._fixed[driver.LONGEST] = LONGEST + begun - time.perf_counter()
             reason = self._call(until, now, end, first)
             if reason != driver.STALE:
                 break
-            s.build_lists(float(now[driver.LENGTH]))
+            s.renew_lists(float(now[driver.LENGTH]))
             now[driver.REACH] = s.search.reach_factor
             first = self._program.after_prediction
         if reason == driver.WIDER:
+            if s.step > step or not first:
+                s.renew_lists(float(now[driver.LENGTH]))  # counts widenings from here on
             s.complete(float(now[driver.LENGTH]), float(now[driver.UNTIL]))
             s.keep_row()
 

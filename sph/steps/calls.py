@@ -20,6 +20,7 @@ import llvmlite.binding as llvm
 import numpy as np
 from llvmlite import ir
 from numba import types
+from numba.core.errors import NumbaError
 from numba.core.typing.typeof import Purpose, typeof
 from numba.extending import intrinsic
 
@@ -53,12 +54,16 @@ class Table:
         self.places: dict[str, list[int]] = {}  # of `Held` arguments: indices of their first words
 
     def add(self, function: Callable[..., Any], *arguments: Any) -> None:
-        """Add a call of a function that Numba compiled, with arguments or `Held` arguments."""
+        """Add a call of a function that Numba compiled, with arguments or `Held` arguments.
+
+        Raises Unsuitable.
+        """
         signature = tuple(typeof(_plain(one), Purpose.argument) for one in arguments)
-        function.compile(signature)  # type: ignore[attr-defined]
-        found = function.overloads.get(signature)  # type: ignore[attr-defined]
-        if found is None:
-            raise Unsuitable(f"{function} has arguments with defaults")
+        try:
+            function.compile(signature)  # type: ignore[attr-defined]
+        except (NumbaError, TypeError) as error:  # other arguments, such as those with defaults
+            raise Unsuitable(f"{function}: {error}") from error
+        found = function.overloads[signature]  # type: ignore[attr-defined]
         described = found.fndesc
         _check_result(described.restype)
         kind = found.target_context.call_conv.get_function_type(

@@ -86,7 +86,7 @@ def test_steps_with_nan_in_fields_not_reordered_give_equal_results(settings):
     simulation = begun(settings)
     expected = {name: array.copy() for name, array in advance(simulation, 8).items()}
     again = begun(settings)
-    build = again.build_lists
+    build = again._build_lists
 
     def forget(dt, guess=False):
         build(dt, guess)
@@ -94,7 +94,7 @@ def test_steps_with_nan_in_fields_not_reordered_give_equal_results(settings):
             if field.name not in carried(again.scene):
                 getattr(again.particles, field.name)[:] = np.nan
 
-    again.build_lists = forget
+    again._build_lists = forget
     again.search.lists = None  # so that the coming step builds them
     advanced = advance(again, 8)
     for name in ("position", "velocity", "internal_energy"):
