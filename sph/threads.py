@@ -60,7 +60,10 @@ class Team:
         if self._pool is not None:
             self._pool.shutdown()
 
-    def _share(self, function: Callable[..., Any], edges: Sequence[int], arguments) -> list[Any]:
+    def _share(
+        self, function: Callable[..., Any], edges: Sequence[int], arguments: tuple[Any, ...]
+    ) -> list[Any]:
+        """Call function(first, last, *arguments) for ranges between consecutive edges."""
         results: list[Any] = [None] * (len(edges) - 1)
         ranges = iter(list(enumerate(itertools.pairwise(edges))))
 
