@@ -65,8 +65,9 @@ class Team:
             self._pool.shutdown()
 
     def _share(
-        self, function: Callable[..., Any], edges: Sequence[int], arguments: Sequence[Any]
+        self, function: Callable[..., Any], edges: Sequence[int], arguments: tuple[Any, ...]
     ) -> list[Any]:
+        """Call function(first, last, *arguments) for ranges between consecutive edges."""
         results: list[Any] = [None] * (len(edges) - 1)
         ranges = iter(list(enumerate(itertools.pairwise(edges))))
 
