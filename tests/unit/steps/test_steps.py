@@ -162,6 +162,18 @@ def broken_at(simulation, step, field, value):
     simulation.proceed = broken
 
 
+def test_energy_injected_has_bits_of_ordinary_steps(ordinary):
+    """Cooling of a particle by more than half of its internal energy, 2.5, in half a step."""
+    settings = (*SCENES["mirror"], "physics.max_energy_drift=1.0")
+    simulations = started(*settings), ordinary(*settings)
+    for one in simulations:
+        broken_at(one, 20, "energy_rate", -4.0 / one.limit.dt)
+    rows, _ = taken(simulations[0], most=30)
+    expected, _ = taken(simulations[1], most=30)
+    assert rows == expected
+    assert rows["energy_injected"][-1] > 0.0
+
+
 def test_particle_far_outside_is_found_at_its_step(ordinary):
     simulations = started("problem.boundary=open"), ordinary("problem.boundary=open")
     for one in simulations:
