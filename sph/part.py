@@ -109,7 +109,7 @@ class Pass(NamedTuple):
         return {name for name in names if name is not None}
 
 
-# The methods of a part that each step calls, unless they are those of `Part`.
+# The methods of a part that each step calls in Python, unless they are those of `Part`.
 IN_PYTHON = ("split", "split_predicted", "step_limit", "energies", "sums", "check")
 
 
