@@ -172,7 +172,7 @@ class Watchdog:
 
     def steps_to_mark(self, step: int) -> int:
         """Return the number of steps until the next check of the pace that may find something."""
-        return 1 if self._marked is None else self._marked[1] + WINDOW - step
+        return 1 if self._marked is None else max(1, self._marked[1] + WINDOW - step)
 
     def check_pace(self, simulation) -> None:
         """Raise NumericalError if steps have become so short that the run cannot end."""
