@@ -29,7 +29,12 @@ RESULTS = 12  # words for the result of a function
 WORD = ir.IntType(64)
 STATUS = ir.IntType(32)  # of a call: 0 if the function raised no exception
 
-_thunks: dict[str, int] = {}  # addresses by native signature
+WORDS = str(WORD.as_pointer())
+
+Signature = tuple[str, ...]  # LLVM's types of the arguments of a function
+_TYPES = {str(one): one for one in (WORD, STATUS, ir.DoubleType(), ir.IntType(8), ir.IntType(1))}
+
+_thunks: dict[Signature, int] = {}  # addresses by native signature
 _engines: list[llvm.ExecutionEngine] = []  # which own the code of the thunks
 
 
@@ -50,7 +55,7 @@ class Table:
     def __init__(self):
         self._words: list[int] = []
         self._begins: list[int] = []
-        self._kinds: list[ir.FunctionType] = []
+        self._signatures: list[Signature] = []
         self.places: dict[str, list[int]] = {}  # of `Held` arguments: indices of their first words
 
     def add(self, function: Callable[..., Any], *arguments: Any) -> None:
@@ -66,12 +71,13 @@ class Table:
         found = function.overloads[signature]  # type: ignore[attr-defined]
         described = found.fndesc
         _check_result(described.restype)
-        kind = found.target_context.call_conv.get_function_type(
+        native = found.target_context.call_conv.get_function_type(
             described.restype, described.argtypes
         )
         begin = len(self._words)
         self._begins.append(begin)
-        self._kinds.append(kind)
+        # two addresses come first: those of the result and of the exception
+        self._signatures.append(tuple(map(_native, native.args[2:])))
         self._words.append(found.library.get_pointer_to_function(described.llvm_func_name))
         self._words += [0] * RESULTS
         for one in arguments:
@@ -80,9 +86,8 @@ class Table:
                     self._words.append(word)
                 else:
                     self.places.setdefault(name, []).append(len(self._words))
-        expected = len(kind.args) - 2  # besides the places of the result and the exception
-        if len(self._words) - begin - 1 - RESULTS != expected:
-            raise Unsuitable(f"{function}: expected {expected} words of arguments")
+        if len(self._words) - begin - 1 - RESULTS != len(self._signatures[-1]):
+            raise Unsuitable(f"{function}: expected {len(self._signatures[-1])} words")
 
     def finished(self) -> tuple[np.ndarray, np.ndarray]:
         """Return the words, and for each call (K, 2) the address of its thunk and its first word.
@@ -90,7 +95,7 @@ class Table:
         int64; the words must not be moved in memory.
         """
         words = np.array(self._words, np.int64)
-        thunks = _thunks_of(self._kinds)
+        thunks = _thunks_of(self._signatures)
         return words, np.array(list(zip(thunks, self._begins, strict=True)), np.int64)
 
 
@@ -150,39 +155,49 @@ def _check_result(kind: Any) -> None:
         raise Unsuitable(f"expected up to {RESULTS} numbers as result, not {kind}")
 
 
-def _thunks_of(kinds: list[ir.FunctionType]) -> list[int]:
+def _thunks_of(signatures: list[Signature]) -> list[int]:
     """Return the addresses of the thunks for native signatures."""
-    new = {str(kind): kind for kind in kinds if str(kind) not in _thunks}
+    new = [one for one in dict.fromkeys(signatures) if one not in _thunks]
     if new:
-        module = ir.Module()
-        module.triple = llvm.get_process_triple()
-        for number, kind in enumerate(new.values()):
-            _write_thunk(module, f"thunk{number}", kind)
+        text = "".join(_thunk(number, one) for number, one in enumerate(new))
         # loads and a call: there is nothing to optimise
         machine = llvm.Target.from_default_triple().create_target_machine(opt=0)
-        engine = llvm.create_mcjit_compiler(llvm.parse_assembly(str(module)), machine)
+        engine = llvm.create_mcjit_compiler(llvm.parse_assembly(text), machine)
         engine.finalize_object()
         _engines.append(engine)
-        for number, text in enumerate(new):
-            _thunks[text] = engine.get_function_address(f"thunk{number}")
-    return [_thunks[str(kind)] for kind in kinds]
+        _thunks.update((one, engine.get_function_address(f"thunk{k}")) for k, one in enumerate(new))
+    return [_thunks[one] for one in signatures]
 
 
-def _write_thunk(module: ir.Module, name: str, kind: ir.FunctionType) -> None:
-    function = ir.Function(module, ir.FunctionType(STATUS, [WORD.as_pointer()]), name)
-    builder = ir.IRBuilder(function.append_basic_block())
+def _native(kind: ir.Type) -> str:
+    """Return the type in which a word is passed."""
+    text = str(kind)
+    if isinstance(kind, ir.PointerType) or text == "i64":
+        return "i64"
+    if text not in ("double", "i32", "i8", "i1"):
+        raise Unsuitable(f"an argument of type {text}")
+    return text
 
-    def place(index, of):
-        slot = builder.gep(function.args[0], [ir.Constant(WORD, index)])
-        return builder.bitcast(slot, of.as_pointer())
 
-    result, exception, *arguments = kind.args
-    callee = builder.inttoptr(builder.load(place(0, WORD)), kind.as_pointer())
-    loaded = [
-        builder.load(place(index, one)) for index, one in enumerate(arguments, start=1 + RESULTS)
-    ]
-    unused = builder.alloca(exception.pointee)
-    builder.ret(builder.call(callee, [place(1, result.pointee), unused, *loaded]))
+def _thunk(number: int, signature: Signature) -> str:
+    """Return a thunk in LLVM's language, written here since llvmlite's builder takes longer."""
+    given = ["i64", "i64", *signature]  # addresses of the results and of the unused exception
+    function = ir.FunctionType(STATUS, [_TYPES[one] for one in given]).as_pointer()
+    lines = [
+        f"define i32 @thunk{number}({WORDS} %w) {{", "%unused = alloca i64",
+        f"%r = getelementptr i64, {WORDS} %w, i64 1", f"%g0 = ptrtoint {WORDS} %r to i64",
+        f"%g1 = ptrtoint {WORDS} %unused to i64", f"%a = load i64, {WORDS} %w",
+        f"%f = inttoptr i64 %a to {function}",
+    ]  # fmt: skip
+    for k, kind in enumerate(signature, start=2):
+        lines.append(f"%p{k} = getelementptr i64, {WORDS} %w, i64 {RESULTS + k - 1}")
+        name = f"%g{k}" if kind == "i64" else f"%l{k}"
+        lines.append(f"{name} = load i64, {WORDS} %p{k}")
+        if kind != "i64":
+            how = "bitcast" if kind == "double" else "trunc"
+            lines.append(f"%g{k} = {how} i64 %l{k} to {kind}")
+    arguments = ", ".join(f"{kind} %g{k}" for k, kind in enumerate(given))
+    return "\n".join([*lines, f"%s = call i32 %f({arguments})", "ret i32 %s", "}", ""])
 
 
 @intrinsic
