@@ -224,7 +224,8 @@ class Simulation:
     def _neighbours(self) -> passes.Neighbours:
         search: Any = self.search  # whose lists are built before the first pass
         return passes.Neighbours(
-            search.lists, search.images, search.origin.support, search.reach_factor
+            search.lists, search.images, search.boxes, search.origin.support, search.reach_factor,
+            self.scene.lanes,
         )
 
     def _make(self, one: Pass) -> None:
@@ -242,8 +243,7 @@ class Simulation:
                 self._check_found()
                 return
             with self.clock.phase("lists"):
-                self._bring_inside()
-                self.search.widen(p.position, sweep.wanted, p.id)
+                self.search.widen(sweep.wanted, p.id)
         raise faults.starved(self, int(np.argmax(sweep.wanted)))
 
     def _check_found(self) -> None:

@@ -11,19 +11,21 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from sph.neighbours import lists
+from sph.neighbours.lists import SUPERBLOCK
 from sph.state import State
-from sph.threads import Team
-
-TINY = 1e-300  # added to r^2: keeps 1/r finite where r_ij = 0, where its factor is zero too
+from sph.threads import SMALLEST_RANGE, Team
 
 
 class Neighbours(NamedTuple):
-    """Candidates of all blocks, complete up to reach_factor times each particle's list_support."""
+    """Lists of all superblocks, complete up to reach_factor times each particle's list_support."""
 
-    lists: tuple
+    lists: lists.Lists
     images: tuple
+    boxes: np.ndarray  # (blocks, 2 D) lower and upper corners of the present positions
     list_support: np.ndarray  # (N,) H when the lists were built
     reach_factor: float
+    lanes: tuple  # the arithmetic of pairs, see `sph.simd`
 
 
 class Sweep:
@@ -45,5 +47,10 @@ class Sweep:
         self.is_start = False  # before the first step, where supports are guesses
 
     def run(self, function, models, *arguments) -> None:
-        """Call function(first, last, dim, models, neighbours, *arguments) over ranges of blocks."""
-        self.team.run(function, self.wanted.size, self.dim, models, self.neighbours, *arguments)
+        """Call function(first, last, dim, models, neighbours, *arguments) over ranges of superblocks."""
+        neighbours: Any = self.neighbours
+        superblocks = neighbours.lists.count.size
+        self.team.run(
+            function, superblocks, self.dim, models, neighbours, *arguments,
+            smallest=SMALLEST_RANGE // SUPERBLOCK,
+        )  # fmt: skip
