@@ -12,6 +12,7 @@ divides vectors that are wider than the registers of a processor, so the width i
 processor, and no function needs an instruction of one processor alone.
 """
 
+import math
 import operator
 from typing import NamedTuple
 
@@ -208,14 +209,26 @@ for _sign, _function in (
         lambda builder, kind, a, b, sign=_sign: builder.fcmp_ordered(sign, a, b),
         lambda kind: Mask(kind.width),
     )
-for _name, _function in (("llvm.maxnum", larger), ("llvm.minnum", smaller)):
-    _of_two(
-        _function,
-        lambda builder, kind, a, b, name=_name: _call(
-            builder, name, kind, a.type, (a, b), FASTEST
-        ),
-    )
-for _name, _functions in (("llvm.fabs", (abs, np.abs)), ("llvm.sqrt", (np.sqrt,))):
+for _name, _functions in (
+    ("llvm.maxnum", (larger, np.maximum)),
+    ("llvm.minnum", (smaller, np.minimum)),
+):
+    for _function in _functions:
+        _of_two(
+            _function,
+            lambda builder, kind, a, b, name=_name: _call(
+                builder, name, kind, a.type, (a, b), FASTEST
+            ),
+        )
+_of_two(
+    operator.pow, lambda builder, kind, a, b: _call(builder, "llvm.pow", kind, a.type, (a, b))
+)
+for _name, _functions in (
+    ("llvm.fabs", (abs, np.abs)),
+    ("llvm.sqrt", (np.sqrt, math.sqrt)),
+    ("llvm.exp", (np.exp, math.exp)),
+    ("llvm.log", (np.log, math.log)),
+):
     for _function in _functions:
         _of_one(
             _function,
@@ -322,10 +335,7 @@ def load_inside(typing_context, lanes, array, index, inside, fill):
             with builder.if_then(there):
                 builder.store(builder.load(place), value)
             return builder.load(value)
-        whole = Vec(types.int64, width)
-        mask = builder.icmp_signed(
-            "<", _indices(range(width), I64), _filled(builder, inside, whole)
-        )
+        mask = _first_lanes(builder, inside, width)
         kind = _llvm(result)
         function = cgutils.get_or_insert_function(
             builder.module,
@@ -382,6 +392,38 @@ def _rows(lanes, number, length):
 
 
 # --- lanes ---
+
+
+@intrinsic
+def store_inside(typing_context, array, index, inside, x):
+    """Write the first `inside` lanes of x to array[index], array[index + 1], …"""
+
+    def generate(context, builder, sig, arguments):
+        array, index, inside, value = arguments
+        place = _place(context, builder, sig.args[0], array, sig.args[1], index)
+        inside = context.cast(builder, inside, sig.args[2], types.int64)
+        kind = sig.args[3]
+        if not isinstance(kind, Vec):
+            with builder.if_then(builder.icmp_signed(">", inside, ir.Constant(I64, 0))):
+                builder.store(context.cast(builder, value, kind, sig.args[0].dtype), place)
+            return context.get_dummy_value()
+        mask = _first_lanes(builder, inside, kind.width)
+        pointer = builder.bitcast(place, value.type.as_pointer())
+        function = cgutils.get_or_insert_function(
+            builder.module,
+            ir.FunctionType(ir.VoidType(), [value.type, pointer.type, I32, mask.type]),
+            f"llvm.masked.store.v{kind.width}f64.p0",
+        )
+        builder.call(function, (value, pointer, ir.Constant(I32, 8), mask))
+        return context.get_dummy_value()
+
+    return types.void(array, index, inside, x), generate
+
+
+def _first_lanes(builder, number, width):
+    """Return a mask whose first `number` lanes are true."""
+    lanes = _indices(range(width), I64)
+    return builder.icmp_signed("<", lanes, _filled(builder, number, Vec(types.int64, width)))
 
 
 def _filler(of_width):
@@ -526,20 +568,21 @@ PERMUTES = _has_avx512()
 
 
 @intrinsic
-def front(typing_context, mask):
+def front(typing_context, lanes, mask):
     """Return the numbers of the true lanes, in order, for `pick`."""
     if not (isinstance(mask, Mask) and PERMUTES):
-        return mask(mask), lambda context, builder, sig, arguments: arguments[0]
-    kind = Vec(types.int32, mask.width)
+        return mask(lanes, mask), lambda context, builder, sig, arguments: arguments[1]
+    integer = types.int64 if lanes.instance_class.kind == types.float64 else types.int32
+    kind = Vec(integer, mask.width)
 
     def generate(context, builder, sig, arguments):
-        lanes, undefined = _indices(range(mask.width)), ir.Constant(_llvm(kind), ir.Undefined)
+        numbers = _indices(range(mask.width), _KINDS[integer])
         return _call(
             builder, "llvm.experimental.vector.compress", kind, _llvm(kind),
-            (lanes, arguments[0], undefined), (),
+            (numbers, arguments[1], ir.Constant(_llvm(kind), ir.Undefined)), (),
         )  # fmt: skip
 
-    return kind(mask), generate
+    return kind(lanes, mask), generate
 
 
 # Permutations of lanes by a vector of lane numbers.
@@ -561,8 +604,8 @@ def picked(builder, kind, value, lanes, chosen):
             builder, "llvm.experimental.vector.compress", kind, result,
             (value, chosen, ir.Constant(result, ir.Undefined)), (),
         )  # fmt: skip
-    if kind.kind == types.float64:
-        chosen = builder.zext(chosen, ir.VectorType(I64, kind.width))
+    if lanes.kind == types.int64 and kind.kind != types.float64:
+        chosen = builder.trunc(chosen, ir.VectorType(I32, kind.width))
     function = cgutils.get_or_insert_function(
         builder.module,
         ir.FunctionType(result, [result, chosen.type]),
@@ -579,38 +622,71 @@ def pick(typing_context, x, lanes):
     )
 
 
-# --- the inverse square root ---
+# --- inverse roots ---
 
-# First guesses: the exponent is halved by an integer operation, with an error of at most 3.5 %
-# (Lomont 2003). With e = 1 - x y^2, 1/sqrt(x) = y (1 + e/2 + 3 e^2/8 + 5 e^3/16 + ...); a step with
-# n terms multiplies the number of correct digits by n.
-_GUESS = {types.float64: (0x5FE6EB50C7B537A9, I64), types.float32: (0x5F375A86, I32)}
-_TERMS = {types.float64: (3, 4), types.float32: (3, 2)}  # down to the last bit but one
-_SERIES = (1.0, 1.0 / 2.0, 3.0 / 8.0, 5.0 / 16.0)
+# First guesses by an integer operation on the exponent, with an error of 3.5 % at most (Lomont
+# 2003), and for AVX-512 by an instruction, with an error of 2^-14. With e = 1 - x y^n,
+# x^(-1/n) = y (1 + e/n + ...); a step with k terms multiplies the number of correct digits by k.
+_SERIES = {2: (1.0, 1.0 / 2.0, 3.0 / 8.0, 5.0 / 16.0), 3: (1.0, 1.0 / 3.0, 2.0 / 9.0, 14.0 / 81.0)}
+_GUESSES = {
+    (2, types.float64): (0x5FE6EB50C7B537A9, I64),
+    (2, types.float32): (0x5F375A86, I32),
+    (3, types.float64): (0x553EF0FF289DD796, I64),
+}
+_STEPS = {(2, types.float64): (3, 4), (2, types.float32): (3, 2), (3, types.float64): (4, 4)}
+_ESTIMATES = {
+    (types.float64, 8): ("llvm.x86.avx512.rsqrt14.pd.512", (4,)),
+    (types.float32, 16): ("llvm.x86.avx512.rsqrt14.ps.512", (2,)),
+}
 
 
-@intrinsic
-def inverse_sqrt(typing_context, x):
-    """Return 1/sqrt(x) for normal x > 0, to two units in the last place."""
-    base = x.kind if isinstance(x, Vec) else x
+def _guess(builder, x, kind, value, n, base):
+    """Return LLVM code for a guess of value^(-1/n), and the numbers of terms of the steps."""
+    if n == 2 and PERMUTES and isinstance(x, Vec) and (base, x.width) in _ESTIMATES:
+        name, steps = _ESTIMATES[base, x.width]
+        every = ir.IntType(max(8, x.width))
+        function = cgutils.get_or_insert_function(
+            builder.module, ir.FunctionType(kind, [kind, kind, every]), name
+        )
+        arguments = (value, ir.Constant(kind, ir.Undefined), ir.Constant(every, -1))
+        return builder.call(function, arguments), steps
+    guess, integer = _GUESSES[n, base]
+    whole = ir.VectorType(integer, x.width) if isinstance(x, Vec) else integer
+    bits = builder.bitcast(value, whole)
+    part = builder.lshr(bits, _all(whole, 1)) if n == 2 else builder.udiv(bits, _all(whole, n))
+    return builder.bitcast(builder.sub(_all(whole, guess), part), kind), _STEPS[n, base]
 
-    def generate(context, builder, sig, arguments):
-        (value,) = arguments
-        kind = _llvm(x)
-        guess, integer = _GUESS[base]
-        whole = ir.VectorType(integer, x.width) if isinstance(x, Vec) else integer
-        half = builder.lshr(builder.bitcast(value, whole), _all(whole, 1))
-        y = builder.bitcast(builder.sub(_all(whole, guess), half), kind)
 
-        def times(a, b):
-            return builder.fmul(a, b, flags=EXACT)
+def _inverse_root(n):
+    """A function that returns x^(-1/n) for normal x > 0, to a few units in the last place."""
 
-        for terms in _TERMS[base]:
-            e = builder.fsub(_all(kind, 1.0), times(times(value, y), y), flags=EXACT)
-            total = _all(kind, _SERIES[terms - 1])
-            for factor in _SERIES[terms - 2 : 0 : -1]:
-                total = builder.fadd(times(total, e), _all(kind, factor), flags=EXACT)
-            y = builder.fadd(times(times(total, e), y), y, flags=EXACT)
-        return y
+    @intrinsic
+    def root(typing_context, x):
+        base = x.kind if isinstance(x, Vec) else x
 
-    return x(x), generate
+        def generate(context, builder, sig, arguments):
+            (value,) = arguments
+            kind = _llvm(x)
+            y, steps = _guess(builder, x, kind, value, n, base)
+
+            def times(a, b):
+                return builder.fmul(a, b, flags=EXACT)
+
+            for terms in steps:
+                power = times(value, y)
+                for _ in range(n - 1):
+                    product, power = power, times(power, y)
+                e = builder.fsub(_all(kind, 1.0), times(product, y), flags=EXACT)
+                total = _all(kind, _SERIES[n][terms - 1])
+                for factor in _SERIES[n][terms - 2 : 0 : -1]:
+                    total = builder.fadd(times(total, e), _all(kind, factor), flags=EXACT)
+                y = builder.fadd(times(times(total, e), y), y, flags=EXACT)
+            return y
+
+        return x(x), generate
+
+    return root
+
+
+inverse_sqrt = _inverse_root(2)
+inverse_cbrt = _inverse_root(3)

@@ -13,11 +13,13 @@ from sph.neighbours.order import BLOCK
 from sph.threads import Team
 
 # Growth of support radii that lists allow between two builds. If exceeded, the pass is repeated.
-GROWTH = 0.03
+GROWTH = 0.05
 
-# Cost of building lists divided by that of the two passes, measured in 3-D with 125 neighbours:
-# (0.2 + 1.4) / (0.93 + 0.85) microseconds per particle.
-BUILD_OVER_PASSES = 0.9
+# Cost of a build (memory order and lists) divided by that of the two passes, and share of the
+# passes that grows with the skin (copying listed blocks, and their selection). Measured in 3-D with
+# 125 neighbours: (0.24 + 0.11) / (0.53 + 0.66) and 0.15 / (0.53 + 0.66) microseconds per particle.
+BUILD_OVER_PASSES = 0.3
+COPYING = 0.12
 
 # Share of superblocks above which all lists are built again instead of those that asked.
 MANY = 0.3
@@ -78,11 +80,12 @@ def best_skin(step: float, dimension: int) -> float:
     """Return the skin with the lowest cost per step if particles move `step` supports in a step.
 
     Lists that serve k steps need a skin of GROWTH + 2 (k - 1) step. Each step then costs 1/k of a
-    build, and passes over candidates whose number grows as (1 + skin)^D.
+    build, and the number of listed blocks grows as (1 + skin)^D.
     """
     least, steps = np.inf, 1
     for k in range(1, 21):
-        cost = BUILD_OVER_PASSES / k + (1 + GROWTH + 2 * (k - 1) * step) ** dimension
+        skin = GROWTH + 2 * (k - 1) * step
+        cost = BUILD_OVER_PASSES / k + COPYING * (1 + skin) ** dimension
         if not cost < least:  # the costs are convex in k
             break
         least, steps = cost, k

@@ -31,6 +31,7 @@ from sph.simd import (
     pick,
     rows,
     store,
+    store_inside,
     width,
 )
 from sph.spatial import corner, dot, larger_each, load_column, load_rows, minus, move, times
@@ -144,10 +145,20 @@ def copy_vectors(lanes, dim, copied, begin, field, block, neighbours, image, ori
 
 
 @njit(**INLINED)
-def read(lanes, field, block, lane):
-    """Return the values of a field (N,) in a block, from its lane `lane`; 0 outside the array."""
+def read(lanes, field, block, lane, outside):
+    """Return the values of a field (N,) in a block from its lane `lane`, in double precision.
+
+    outside: value of the lanes outside the array.
+    """
     k = block * BLOCK + lane
-    return load_inside(lanes, field, k, field.size - k, 0.0)
+    return load_inside(lanes, field, k, field.size - k, outside)
+
+
+@njit(**INLINED)
+def write(field, block, lane, values):
+    """Write the values of a field (N,) in a block from its lane `lane`."""
+    k = block * BLOCK + lane
+    store_inside(field, k, field.size - k, values)
 
 
 def copy_values(lanes, copied, begin, field, block, factor):
@@ -164,7 +175,7 @@ def _copy_values(lanes, copied, begin, field, block, factor):
 
     def copy(lanes, copied, begin, field, block, factor):
         for lane in range(0, BLOCK, block_width(lanes)):
-            store(copied, begin + lane, read(lanes, field, block, lane) * factor)
+            store(copied, begin + lane, read(lanes, field, block, lane, 0.0) * factor)
         return begin + BLOCK
 
     return copy
@@ -174,7 +185,7 @@ def _copy_values(lanes, copied, begin, field, block, factor):
 def copy_products(lanes, copied, begin, a, b, block, factor):
     """Copy the product of two fields (N,) of a block to `copied`, times factor."""
     for lane in range(0, BLOCK, block_width(lanes)):
-        product = read(lanes, a, block, lane) * read(lanes, b, block, lane)
+        product = read(lanes, a, block, lane, 0.0) * read(lanes, b, block, lane, 0.0)
         store(copied, begin + lane, product * factor)
 
 
@@ -220,7 +231,7 @@ def near_blocks(lanes, dim, boxes, number, low, high, reach, chosen):
         gap = larger_each(larger_each(above, below), 0.0)
         farthest = larger(load_block(lanes, boxes, (2 * D, t)), reach)
         near = dot(gap, gap) < farthest * farthest
-        store(chosen, m, pick(numbers_from(lanes, t), front(near)))
+        store(chosen, m, pick(numbers_from(lanes, t), front(lanes, near)))
         m += count(near)
     return m
 
@@ -244,7 +255,7 @@ def near_particles(lanes, dim, copied, fields, own, chosen, blocks, low, high, r
             if own > 0:
                 H_inv = load_block(lanes, copied, begin + own * BLOCK)
                 is_near = is_near | (squared * H_inv * H_inv < 1.0)
-            move(lanes, fields, copied, begin, front(is_near), near, nc)
+            move(lanes, fields, copied, begin, front(lanes, is_near), near, nc)
             nc += count(is_near)
     for f in range(len(fields)):
         for k in range(0, width(lanes), block_width(lanes)):

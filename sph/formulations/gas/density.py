@@ -8,7 +8,7 @@ from numba import njit
 
 from sph.compiled import COMPILED, INLINED
 from sph.formulations.gas.smoothing import WEIGHT, R, find_support
-from sph.formulations.gas.thermodynamics import dissipation, equation_of_state, summed
+from sph.formulations.gas.thermodynamics import summed, thermodynamics
 from sph.formulations.gas.weighting import copy_weights, mass_per_weight, weight
 from sph.kernels import dw_over_q, normalisation, w
 from sph.neighbours.order import BLOCK
@@ -137,9 +137,6 @@ def density(
                         needed /= per_length * neighbours.list_support[i]
                         wanted[block] = max(wanted[block], needed)
                         continue
-                    c = equation_of_state(
-                        i, models, rho_i, Omega_i, energy, pressure, pressure_term, sound_speed
-                    )
                     if energy_shift is not None:
                         E, slope = _energy_density(lanes, models.kernel, dim, pairs, n, H_inv)
                         scale = per_length**D / per_energy
@@ -150,13 +147,15 @@ def density(
                     if div_v is not None:
                         scale = per_length / (per_velocity * Omega_i * n_i)
                         div, curl = _motion(lanes, models.kernel, dim, pairs, n, H_inv, curl_v)
-                        div, curl = scale * div, scale * curl
-                        div_v[i] = div
+                        div_v[i] = scale * div
                         if curl_v is not None:
-                            curl_v[i] = curl
-                        dissipation(i, models, support[i], c, div, curl, alpha, balsara, alpha_rate)
+                            curl_v[i] = scale * curl
                 if not wanted[block] > 0.0:
                     break
+            thermodynamics(
+                lanes, models, block, energy, support, rho, Omega, div_v, curl_v, alpha,
+                energy_shift, pressure, pressure_term, sound_speed, balsara, alpha_rate,
+            )  # fmt: skip
 
 
 @njit(**INLINED)
@@ -180,7 +179,7 @@ def _select(
         r_ij = minus(x_i, load_spatial(lanes, dim, near, 0, k))
         squared = dot(r_ij, r_ij)
         inside = squared < reach * reach
-        chosen = front(inside)
+        chosen = front(lanes, inside)
         store(pairs, (R, n), pick(squared, chosen))
         store(pairs, (WEIGHT, n), pick(load(lanes, near, (D, k)), chosen))
         if div_v is not None:

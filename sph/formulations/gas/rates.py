@@ -208,9 +208,9 @@ def _copy_slopes(lanes, dim, copied, begin, support, mass, block, per_length, pe
     """Copy 1/H, C m/2 and C m/2 H^-(D+2) of a block; return the largest H."""
     largest = 0.0
     for lane in range(0, BLOCK, block_width(lanes)):
-        H = read(lanes, support, block, lane) * per_length
+        H = read(lanes, support, block, lane, 0.0) * per_length
         H_inv = inverse_sqrt(H * H)  # large outside the array, where H = 0
-        m_half = read(lanes, mass, block, lane) * per_mass
+        m_half = read(lanes, mass, block, lane, 0.0) * per_mass
         gradient = m_half * H_inv * H_inv * H_inv
         for _ in range(len(dim) - 1):
             gradient = gradient * H_inv

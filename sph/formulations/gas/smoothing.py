@@ -10,11 +10,12 @@ does not depend on the density.
 
 from typing import NamedTuple
 
+import numpy as np
 from numba import njit
 
 from sph.compiled import INLINED
 from sph.kernels import dw_over_q, normalisation, w
-from sph.simd import filled, lane_sum, load, width
+from sph.simd import filled, inverse_cbrt, lane_sum, load, width
 
 # Rows of `pairs`.
 R, WEIGHT = 0, 1
@@ -39,6 +40,14 @@ class Smoothing(NamedTuple):
     passes: int
     tolerance: float
     unsettled: float = UNSETTLED
+
+
+@njit(**INLINED)
+def _spacing(dim, number):
+    """Return (1/number)^(1/D), for a number of particles per volume."""
+    if len(dim) == 3:
+        return inverse_cbrt(number)
+    return 1.0 / number if len(dim) == 1 else 1.0 / np.sqrt(number)
 
 
 @njit(**INLINED)
@@ -75,7 +84,7 @@ def find_support(smoothing, lanes, kernel, dim, pairs, n, mass, H, ratio, reach,
             sum_w, sum_dw = _sums(lanes, kernel, dim, pairs, n, H_inv)
             Omega = -sum_dw / (D * sum_w)  # eq 8 with eqs 7 and 10: the D w terms cancel the 1
         rho = C * H_inv**D * sum_w  # eq 7
-        H = min(ratio * (mass / rho) ** (1.0 / D), largest)  # eq 15
+        H = min(ratio * _spacing(dim, rho / mass), largest)  # eq 15
     if smoothing.passes > 0:
         if abs(H * H_inv - 1.0) <= smoothing.unsettled and largest > H:
             return H, rho, Omega, (0.0 if reach >= H else H)

@@ -60,7 +60,7 @@ def by_share(self, of_i, of_j, mass_i, mass_j):
 def copy_weights(lanes, copied, begin, weighting, mass, block, factor):
     """Copy the weights of a block to `copied`, times factor."""
     for lane in range(0, BLOCK, block_width(lanes)):
-        m = read(lanes, mass, block, lane)  # 0 outside the array
+        m = read(lanes, mass, block, lane, 0.0)  # 0 outside the array
         store(copied, begin + lane, select(m > 0.0, weight(weighting, m) * factor, 0.0))
 
 

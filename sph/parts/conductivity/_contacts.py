@@ -128,6 +128,5 @@ def contacts(
 def _copy_volumes(lanes, copied, begin, mass, density, block, factor):
     """Copy m/rho of a block to `copied`, times factor."""
     for lane in range(0, BLOCK, block_width(lanes)):
-        m = read(lanes, mass, block, lane)
-        rho = select(m > 0.0, read(lanes, density, block, lane), 1.0)  # none outside the array
-        store(copied, begin + lane, m / rho * factor)
+        m = read(lanes, mass, block, lane, 0.0)
+        store(copied, begin + lane, m / read(lanes, density, block, lane, 1.0) * factor)

@@ -169,7 +169,7 @@ def shocks(
                     v_sig = c_half_i + load(lanes, near, (c_row, k)) - w_ij  # eq 76
                     fastest = larger(fastest, select(q < 1.0, v_sig, 0.0))
                     # the sums below are faster over neighbours only, about half of the candidates
-                    inside = front(q < 1.0)
+                    inside = front(lanes, q < 1.0)
                     g = load(lanes, near, (m_row, k)) * -dw_over_q(kernel, dim, q)
                     r_over_H = times(r_ij, H_inv)
                     store_spatial(pairs, 0, n, pick_spatial(r_over_H, inside))
@@ -219,9 +219,9 @@ def shocks(
 def _copy_signs(lanes, copied, begin, weighting, mass, div_v, block, factor):
     """Copy the weights of a block, times the sign of div v and factor, to `copied`."""
     for lane in range(0, BLOCK, block_width(lanes)):
-        div = read(lanes, div_v, block, lane)
+        div = read(lanes, div_v, block, lane, 0.0)
         sign = select(div > 0.0, 1.0, 0.0) - select(div < 0.0, 1.0, 0.0)
-        w_j = weight(weighting, read(lanes, mass, block, lane))  # div v is 0 outside the array
+        w_j = weight(weighting, read(lanes, mass, block, lane, 0.0))  # div v is 0 outside the array
         store(copied, begin + lane, sign * w_j * factor)
 
 
