@@ -25,6 +25,7 @@ from sph.simd import (
     count,
     filled_block,
     front,
+    load,
     load_block,
     load_inside,
     numbers_from,
@@ -201,6 +202,28 @@ def copy_box(dim, boxes, t, neighbours, block, image, origin, per_length, reach)
         b = (s * corners[block, D + d] + o) * per_length
         boxes[d, t], boxes[D + d, t] = min(a, b), max(a, b)
     boxes[2 * D, t] = reach
+
+
+def value_of(field, i):
+    """Return field[i], or 0.0 if the field is None."""
+
+
+@overload(value_of, jit_options=INLINED)  # type: ignore[arg-type]
+def _value_of(field, i):
+    if isinstance(field, types.NoneType | types.Omitted):
+        return lambda field, i: 0.0
+    return lambda field, i: field[i]
+
+
+def load_of(field, lanes, near, row, k):
+    """Return lanes of a row of `near` that is there unless `field` is None, otherwise 0.0."""
+
+
+@overload(load_of, jit_options=INLINED)  # type: ignore[arg-type]
+def _load_of(field, lanes, near, row, k):
+    if isinstance(field, types.NoneType | types.Omitted):
+        return lambda field, lanes, near, row, k: 0.0
+    return lambda field, lanes, near, row, k: load(lanes, near, (row, k))
 
 
 # --- selection ---

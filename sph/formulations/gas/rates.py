@@ -1,7 +1,8 @@
 """The rate pass: acceleration and du/dt (eqs 22-26), with the pair force of the scheme."""
 
 import numpy as np
-from numba import njit
+from numba import njit, types
+from numba.extending import overload
 
 from sph.compiled import COMPILED, INLINED, larger, smaller
 from sph.formulations.gas.schemes import pair
@@ -16,6 +17,7 @@ from sph.passes.gather import (
     copy_values,
     copy_vectors,
     largest_of,
+    load_of,
     longest_list,
     near_blocks,
     near_particles,
@@ -25,6 +27,7 @@ from sph.passes.gather import (
     scratch,
     unit,
     unpacked,
+    value_of,
 )
 from sph.simd import (
     any_lane,
@@ -118,6 +121,7 @@ def rates(
             nc = near_particles(
                 lanes, dim, copied, every, rest + H_INV, chosen, blocks, low, high, reach, near
             )
+            store(near, (rest + M_HALF, nc), filled(lanes, 1.0))  # a weighting divides by masses
             for i in range(i_first, i_last):
                 x_i = times(minus(at(dim, position, i), x_0), per_length)
                 v_i = times(minus(at(dim, velocity, i), v_0), per_velocity)
@@ -150,23 +154,17 @@ def rates(
                     m_gradient = load(lanes, near, (rest + M_GRADIENT, k))
                     slope_j = m_gradient * force_over_q(kernel, dim, q_j)
                     # eq 24: alpha/2 v_sig w_ij/rho_ij with rho_ij = (rho_i + rho_j)/2
-                    if alpha is not None:
-                        alpha_ij = pair_alpha(viscosity, alpha[i], load(lanes, near, (a_row, k)))
-                    else:
-                        alpha_ij = pair_alpha(viscosity, 0.0, 0.0)
+                    alpha_j = load_of(alpha, lanes, near, a_row, k)
+                    alpha_ij = pair_alpha(viscosity, value_of(alpha, i), alpha_j)
                     Pi = (v_sig * w_ij) * (inverse * r) * -alpha_ij
                     if balsara is not None:
                         Pi *= 0.5 * balsara[i] + load(lanes, near, (f_row, k))
-                    term_i, term_j = P_term_i, load(lanes, near, (rest + P_TERM, k))
-                    if energy_shift is not None:
-                        shift_i, shift_j = by_share(
-                            weighting, energy_shift[i] * per_energy,
-                            load(lanes, near, (shift_row, k)), m_half_i, m_half,
-                        )  # fmt: skip
-                        term_i = term_i * (load(lanes, near, (u_row, k)) - shift_i)
-                        term_j = term_j * (energy[i] * per_energy - shift_j)
-                    else:
-                        term_i, term_j = by_share(weighting, term_i, term_j, m_half_i, m_half)
+                    term_i, term_j = _terms(
+                        energy_shift, weighting, P_term_i, load(lanes, near, (rest + P_TERM, k)),
+                        value_of(energy, i) * per_energy, load_of(pressure, lanes, near, u_row, k),
+                        value_of(energy_shift, i) * per_energy,
+                        load_of(energy_shift, lanes, near, shift_row, k), m_half_i, m_half,
+                    )  # fmt: skip
                     force, work = pair(models.scheme, term_i, term_j, slope_i, slope_j, Pi)
                     gained += work * v_dot_r
                     if exchanged is not None:
@@ -186,6 +184,31 @@ def rates(
                 put(acceleration, i, times(lane_sums(total), -per_length / per_energy))
                 energy_rate[i] = lane_sum(gained) * (per_length / (per_energy * per_velocity))
                 signal_speed[i] = lane_max(fastest) / per_velocity
+
+
+def _terms(
+    energy_shift, weighting, term_i, term_j, u_i, u_j, shift_i, shift_j, mass_i, mass_j
+):  # fmt: skip
+    """Return the pressure terms of a pair, see `schemes` and `weighting`."""
+
+
+@overload(_terms, jit_options=INLINED)  # type: ignore[arg-type]
+def _pressure_terms(
+    energy_shift, weighting, term_i, term_j, u_i, u_j, shift_i, shift_j, mass_i, mass_j
+):  # fmt: skip
+    def shared(
+        energy_shift, weighting, term_i, term_j, u_i, u_j, shift_i, shift_j, mass_i, mass_j
+    ):  # fmt: skip
+        return by_share(weighting, term_i, term_j, mass_i, mass_j)
+
+    def of_energies(
+        energy_shift, weighting, term_i, term_j, u_i, u_j, shift_i, shift_j, mass_i, mass_j
+    ):  # fmt: skip
+        f_i, f_j = by_share(weighting, shift_i, shift_j, mass_i, mass_j)
+        return term_i * (u_j - f_i), term_j * (u_i - f_j)
+
+    is_summed = not isinstance(energy_shift, types.NoneType | types.Omitted)
+    return of_energies if is_summed else shared
 
 
 @njit(**INLINED)
