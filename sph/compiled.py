@@ -19,7 +19,7 @@ FASTMATH = {"nsz", "arcp", "contract", "afn", "reassoc"}
 # NumPy's error model: with Python's check for division by zero no loop would vectorise.
 FLAGS: dict[str, Any] = {"fastmath": FASTMATH, "error_model": "numpy"}
 
-# Numba compiles each function once more for callers from C, of which there are none.
+# Without this, Numba adds to each function a wrapper for callers from C. There are none.
 _NO_C: dict[str, Any] = {"no_cfunc_wrapper": True}
 
 # Options of every compiled function: @njit(**COMPILED). None is compiled with parallel=True: passes

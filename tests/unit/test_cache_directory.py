@@ -60,6 +60,26 @@ def test_new_directory_prunes_old_ones(tmp_path, monkeypatch):
     assert asked == [tmp_path]
 
 
+def test_prune_keeps_directory_made_again_before_lock(tmp_path, monkeypatch):
+    """Another process removes the old directory, and a third one makes and uses a new one."""
+    (path,) = directories(tmp_path, 1)
+    lock = fcntl.flock
+    users = []
+
+    def late(opened, kind):
+        if not users:
+            path.rename(tmp_path / "removed")
+            users.append(Directory(path))
+            assert users[0].descriptor is not None
+        return lock(opened, kind)
+
+    monkeypatch.setattr(cache_directory.fcntl, "flock", late)
+    monkeypatch.setattr(cache_directory, "prune", lambda place: None)
+    prune(tmp_path, kept=0)
+    users[0].write("entry.code", b"content")
+    assert users[0].read("entry.code") == b"content"
+
+
 @pytest.fixture
 def removing(tmp_path, monkeypatch):
     """A directory that another process is removing; the removal ends in the next pause."""
