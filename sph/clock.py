@@ -4,7 +4,7 @@ import time
 
 from numba.core import event
 
-# The phase in which Numba fills its tables, on first use. `Clock.cpu` does not contain this phase.
+# The phase in which Numba starts, on first use. `Clock.cpu` does not contain this phase.
 STARTING = "start of Numba"
 
 

@@ -3,9 +3,8 @@
 from typing import Any
 
 import numpy as np
-from numba.core.registry import cpu_target
 
-from sph import declarations, faults, passes, resolution, totals
+from sph import compile_cache, declarations, faults, passes, resolution, totals
 from sph.clock import STARTING, Clock
 from sph.integrators import leapfrog, step_size
 from sph.neighbours.order import number_of_blocks
@@ -32,8 +31,7 @@ class Simulation:
 
     def __init__(self, scene: Scene, particles: State, threads: int, clock: Clock):
         with clock.phase(STARTING):
-            # Numba fills its tables on first use. Filled here, they add no time to other phases.
-            cpu_target.target_context.refresh()
+            compile_cache.start_numba()  # here, where it adds no time to other phases
         self.scene = scene
         self.particles = particles
         self.clock = clock

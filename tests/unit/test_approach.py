@@ -10,6 +10,7 @@ from sph import config as configuration
 from sph.clock import Clock
 from sph.domain import Domain
 from sph.integrators import step_size
+from sph.neighbours import approach
 from sph.neighbours.approach import FAR, first_contact
 from sph.neighbours.search import Origin
 from sph.problems import uniform
@@ -228,6 +229,12 @@ def test_separating_or_resting_clouds_do_not_limit_step(begin):
     assert parting.limit.criterion != "approach"
     resting = begin(scene_of(place, 0 * speed, 1e-8))
     assert resting.limit.criterion != "approach"
+
+
+def test_smooth_flow_does_not_compile_search_for_contacts(begin, monkeypatch):
+    monkeypatch.setattr(approach, "_walk", None)
+    place, speed = meeting(1, 50)
+    begin(scene_of(place, 0 * speed, 1e-8))
 
 
 def test_restart_with_contact_bound_is_bit_for_bit(begin):
