@@ -43,11 +43,12 @@ class Smoothing(NamedTuple):
 
 
 @njit(**INLINED)
-def _spacing(dim, number):
-    """Return (1/number)^(1/D), for a number of particles per volume."""
+def _per_spacing(dim, number):
+    """Return number^(1/D), the inverse of the spacing, for a number of particles per volume."""
     if len(dim) == 3:
-        return inverse_cbrt(number)
-    return 1.0 / number if len(dim) == 1 else 1.0 / np.sqrt(number)
+        root = inverse_cbrt(number)
+        return number * (root * root)
+    return number if len(dim) == 1 else np.sqrt(number)
 
 
 @njit(**INLINED)
@@ -70,27 +71,31 @@ def find_support(smoothing, lanes, kernel, dim, pairs, n, mass, H, ratio, reach,
     D = len(dim)
     rho = 0.0
     Omega = 0.0
-    H_inv = 1.0 / H
+    # in terms of 1/H, so that no division delays the next pass
+    H_inv = before = 1.0 / H
+    mass_inv, ratio_inv, largest_inv = 1.0 / mass, 1.0 / ratio, 1.0 / largest
     for index in range(smoothing.passes):
-        if not reach >= H:
-            return H, rho, Omega, H
-        H_inv = 1.0 / H
+        if not reach * H_inv >= 1.0:
+            return 1.0 / H_inv, rho, Omega, 1.0 / H_inv
         if index < smoothing.passes - 1:
             total = filled(lanes, 0.0)
             for k in range(0, n, width(lanes)):
-                total += load(lanes, pairs, (WEIGHT, k)) * w(kernel, dim, load(lanes, pairs, (R, k)) * H_inv)
+                m, r = load(lanes, pairs, (WEIGHT, k)), load(lanes, pairs, (R, k))
+                total += m * w(kernel, dim, r * H_inv)
             sum_w = lane_sum(total)
         else:
             sum_w, sum_dw = _sums(lanes, kernel, dim, pairs, n, H_inv)
             Omega = -sum_dw / (D * sum_w)  # eq 8 with eqs 7 and 10: the D w terms cancel the 1
         rho = C * H_inv**D * sum_w  # eq 7
-        H = min(ratio * _spacing(dim, rho / mass), largest)  # eq 15
-    if smoothing.passes > 0:
-        if abs(H * H_inv - 1.0) <= smoothing.unsettled and largest > H:
+        before = H_inv
+        H_inv = max(_per_spacing(dim, rho * mass_inv) * ratio_inv, largest_inv)  # eq 15
+    if smoothing.passes > 0 and abs(before - H_inv) <= smoothing.unsettled * H_inv:
+        if H_inv > largest_inv:
+            H = 1.0 / H_inv
             return H, rho, Omega, (0.0 if reach >= H else H)
-        H = 1.0 / H_inv
     return _solve(
-        lanes, kernel, dim, pairs, n, mass, H, ratio, reach, largest, smoothing.tolerance
+        lanes, kernel, dim, pairs, n, mass, 1.0 / before, ratio, reach, largest,
+        smoothing.tolerance,
     )  # fmt: skip
 
 
