@@ -145,7 +145,7 @@ def limit(
     """Return the next step; past: None at the start."""
     s = state
     dt, particle, index = min(team.chunks(
-        _smallest, s.number, s.support, s.signal_speed, s.internal_energy, s.energy_rate,
+        _smallest, s.support.size, s.support, s.signal_speed, s.internal_energy, s.energy_rate,
         s.acceleration if bounds.acceleration else None, s.id, bounds.energy,
     ))  # fmt: skip
     dt, criterion = bounds.courant * dt, CRITERIA[index] if index else bounds.criterion
@@ -184,12 +184,16 @@ def _rate_of_supports(state: State, past: Past | None, team: Team) -> tuple[floa
     """Return the largest |dH/dt|/H, from div v if available, and the particle's ID."""
     divergence = state.get("div_v")
     if divergence is not None:
-        rate, particle = _largest(team.chunks(_fastest_change, state.number, divergence, state.id))
+        rate, particle = _largest(
+            team.chunks(_fastest_change, divergence.size, divergence, state.id)
+        )
         return rate / state.dimension, particle
     if past is None:
         return 0.0, 0
     supports = state.support, state.support_before
-    change, particle = _largest(team.chunks(_largest_change, state.number, *supports, state.id))
+    change, particle = _largest(
+        team.chunks(_largest_change, state.support.size, *supports, state.id)
+    )
     # smaller changes cannot exceed SUPPORT_CHANGE in a step; they may come from the iteration of H,
     # which continues in steps of any length
     return (change / past.dt if change > SUPPORT_CHANGE / GROWTH else 0.0), particle
