@@ -40,12 +40,13 @@ class Key(NamedTuple):
 
 
 class Rule(NamedTuple):
-    """Time integration of a quantity, in place, for arrays of equal shape.
+    """Time integration of a quantity, in place, for particles [first, last).
 
-    predict(dt, value, rate, mass, predicted): advances `value` by half a step, and sets `predicted`
-    to the value after a full step; correct(dt, value, rate, mass): advances `value` by the second
-    half step, with the new rate. Both functions return the energy that they added in addition to
-    the rate, summed over particles.
+    predict(first, last, dt, value, rate, mass, predicted): advances `value` by half a step, and
+    sets `predicted` to the value after a full step; correct(first, last, dt, value, rate, mass):
+    advances `value` by the second half step, with the new rate. mass: (N,), other arrays: (rows,
+    N), where a scalar has one row. Both functions return the energy that they added in addition to
+    the rate, summed over these particles.
     """
 
     predict: Callable[..., float]

@@ -142,7 +142,7 @@ class Simulation:
         sweep.dt = dt
         with self.clock.phase("predict, correct"):
             self._split(dt / 2)
-            self.energy_injected += leapfrog.predict(p, self.evolved, dt)
+            self.energy_injected += leapfrog.predict(p, self.evolved, dt, self.team)
             for part in self.scene.all_parts:
                 part.split_predicted(p, dt / 2)
             stale = self.search.stale(p.position, p.support)
@@ -151,7 +151,7 @@ class Simulation:
         for one in self.scene.passes:
             self._make(one)
         with self.clock.phase("predict, correct"):
-            self.energy_injected += leapfrog.correct(p, self.evolved, dt)
+            self.energy_injected += leapfrog.correct(p, self.evolved, dt, self.team)
             self._split(dt / 2)
         self.step += 1
         self.steps_here += 1
@@ -207,7 +207,7 @@ class Simulation:
         self.list_builds += 1
         with self.clock.phase("order"):
             self._bring_inside()
-            p.reorder(self.search.order(p.position, p.id), self._carried)
+            p.reorder(self.search.order(p.position, p.id), self._carried, self.team)
         with self.clock.phase("lists"):
             if guess:
                 models = self.scene.formulation.models
@@ -261,11 +261,11 @@ class Simulation:
         """Do step 8: totals, energy drift, the next step, and the watchdog's checks."""
         with self.clock.phase("step size, sums"):
             scene, p = self.scene, self.particles
-            self.totals = totals.of(p, scene.all_parts, scene.keeps_momentum)
+            self.totals = totals.of(p, scene.all_parts, scene.keeps_momentum, self.team)
             if self.baseline is None:
                 self.baseline = totals.Baseline.at(self.totals, self.energy_added)
             self.energy_drift = self.baseline.drift(self.totals, self.energy_added)
-            limit = step_size.limit(scene.step_bounds, p, scene.all_parts, past)
+            limit = step_size.limit(scene.step_bounds, p, scene.all_parts, past, self.team)
             self.limit = step_size.before_contact(limit, scene.step_bounds, p, scene.domain)
             self.watchdog.check(self)
 

@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from sph.threads import ALONE, CHUNK, Team
+
 
 class Public(NamedTuple):
     """A field in the public part of a checkpoint: name, exponents of its unit, description."""
@@ -93,9 +95,13 @@ class State:
     """
 
     def __init__(self, fields: Iterable[Field], arrays: Mapping[str, np.ndarray]):
-        """Create a state with those `fields` that `arrays` contains, in the order of `fields`."""
+        """Create a state with those `fields` that `arrays` contains, in the order of `fields`.
+
+        The arrays are not copied and must be contiguous.
+        """
         self.fields = tuple(field for field in fields if field.name in arrays)
         for field in self.fields:
+            assert arrays[field.name].flags.c_contiguous, field.name  # for `rows`
             setattr(self, field.name, arrays[field.name])
 
     if TYPE_CHECKING:  # an attribute for each field; parts declare the fields
@@ -135,6 +141,16 @@ class State:
         """Return the array of that name, or None if no part of the scene declares it."""
         return self.__dict__.get(name)
 
+    def rows(self, name: str) -> np.ndarray:
+        """Return a view of the array of that name, (rows, N): one row for a scalar."""
+        return getattr(self, name).reshape(-1, self.number)
+
+    def total(self, values: np.ndarray, team: Team = ALONE) -> float:
+        """Return the sum of mass times `values`, (N,)."""
+        # A chunk is so short that BLAS does not share it between threads of its own, whose number
+        # depends on the machine.
+        return sum(team.chunks(lambda a, b: float(self.mass[a:b] @ values[a:b]), self.number))
+
     def declare(self, fields: Iterable[Field]) -> list[str]:
         """Keep exactly these fields; add missing fields as zeros and return their names."""
         fields, known = tuple(fields), {field.name for field in self.fields}
@@ -160,7 +176,21 @@ class State:
         """Return a copy in the order of IDs, for comparing runs and for plots."""
         return self.subset(np.argsort(self.id, kind="stable"))
 
-    def reorder(self, order: np.ndarray, names: Iterable[str]) -> None:
+    def reorder(self, order: np.ndarray, names: Iterable[str], team: Team = ALONE) -> None:
         """Reorder the arrays `names` in memory by `order`, (N,) indices."""
         for name in names:
-            setattr(self, name, getattr(self, name).take(order, axis=-1))
+            old = getattr(self, name)
+            if team.threads == 1 or self.number <= CHUNK:
+                new = old.take(order, axis=-1)
+            else:
+                new = np.empty_like(old)
+                rows = old.reshape(-1, self.number), new.reshape(-1, self.number)
+                team.run(_take, self.number, order, *rows, smallest=CHUNK)
+            setattr(self, name, new)
+
+
+def _take(first: int, last: int, order: np.ndarray, old: np.ndarray, new: np.ndarray) -> None:
+    """Set new[:, first:last] to old[:, order[first:last]]; both (rows, N)."""
+    for source, target in zip(old, new, strict=True):
+        # straight to the target, which NumPy does unless it must raise an error for an index
+        source.take(order[first:last], out=target[first:last], mode="clip")

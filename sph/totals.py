@@ -7,6 +7,7 @@ import numpy as np
 from numba import njit
 
 from sph.compiled import COMPILED
+from sph.threads import ALONE, Team
 
 
 class Totals(NamedTuple):
@@ -77,30 +78,61 @@ class Budget(NamedTuple):
     baseline: Baseline
 
 
-def of(state, parts, keeps_momentum) -> Totals:
+def of(state, parts, keeps_momentum, team: Team = ALONE) -> Totals:
     """Return the totals of a state. parts: parts whose energies belong to the total.
 
     keeps_momentum: (D,), 1.0 for axes along which momentum is conserved, 0.0 for others.
     """
     s = state
-    kinetic, relative, internal, *others = _totals(
-        s.mass, s.velocity, s.internal_energy, s.density, s.acceleration, s.energy_rate,
-        keeps_momentum,
-    )  # fmt: skip
+    chunks = team.chunks(_of_chunk, s.mass.size, s, keeps_momentum)
+    momentum, numbers = chunks[0] if len(chunks) == 1 else _combined(chunks, keeps_momentum)
+    kinetic, relative, internal, *others, _ = numbers
     energies = {
-        name: float(s.mass @ each) for part in parts for name, each in part.energies(s).items()
+        name: s.total(each, team) for part in parts for name, each in part.energies(s).items()
     }
-    return Totals(kinetic, relative, internal, energies, *others)
+    return Totals(kinetic, relative, internal, energies, momentum, *others)
+
+
+def _of_chunk(first, last, state, keeps_momentum):
+    s, momentum = state, np.empty(state.position.shape[0])
+    return momentum, sums(
+        first, last, s.mass, s.velocity, s.internal_energy, s.density, s.acceleration,
+        s.energy_rate, keeps_momentum, momentum,
+    )  # fmt: skip
+
+
+def _combined(chunks, keeps_momentum):
+    """Return (momentum, results of `sums`) of all particles from those of the chunks."""
+    momentum = np.array([each for each, _ in chunks])
+    columns = map(np.array, zip(*(numbers for _, numbers in chunks), strict=True))
+    kinetic, relative, internal, volume, low, high, least, most, rates, mass = columns
+    with np.errstate(invalid="ignore", over="ignore"):  # for the watchdog to find
+        # sum m (v - bulk)^2 of a chunk is that about its own mean, and M (mean - bulk)^2
+        means = keeps_momentum * momentum / mass[:, None]
+        bulk = keeps_momentum * momentum.sum(axis=0) / mass.sum()
+        apart = 0.5 * (mass[:, None] * (means - bulk) ** 2).sum()
+        numbers = (
+            kinetic.sum(), relative.sum() + apart, internal.sum(), volume.sum(), low.min(),
+            high.max(), least.min(), most.max(), rates.sum(), mass.sum(),
+        )  # fmt: skip
+    return momentum.sum(axis=0), tuple(map(float, numbers))
 
 
 @njit(**COMPILED)
-def _totals(mass, velocity, energy, density, acceleration, energy_rate, keeps_momentum):
-    D, n = velocity.shape
-    momentum = np.zeros(D)
+def sums(
+    first, last, mass, velocity, energy, density, acceleration, energy_rate, keeps_momentum,
+    momentum,
+):  # fmt: skip
+    """Return the numbers of `Totals` except `energies`, and the mass, of particles [first, last).
+
+    Sets momentum, (D,). The kinetic energy without bulk motion is relative to the mean velocity of
+    these particles.
+    """
+    D = velocity.shape[0]
     kinetic = relative = internal = volume = rates = all_mass = 0.0
     lowest_density = lowest_energy = np.inf
     highest_density = highest_energy = -np.inf
-    for i in range(n):
+    for i in range(np.uint64(first), np.uint64(last)):
         all_mass += mass[i]
         internal += mass[i] * energy[i]
         volume += mass[i] / density[i]
@@ -111,7 +143,7 @@ def _totals(mass, velocity, energy, density, acceleration, energy_rate, keeps_mo
         highest_density = max(highest_density, density[i])
     for d in range(D):
         along = squares = 0.0
-        for i in range(n):
+        for i in range(np.uint64(first), np.uint64(last)):
             along += mass[i] * velocity[d, i]
             squares += mass[i] * velocity[d, i] ** 2
             rates += acceleration[d, i]
@@ -120,10 +152,10 @@ def _totals(mass, velocity, energy, density, acceleration, energy_rate, keeps_mo
         # not a difference of two sums, which would lose all digits at very large Mach numbers
         bulk = keeps_momentum[d] * along / all_mass
         squares = 0.0
-        for i in range(n):
+        for i in range(np.uint64(first), np.uint64(last)):
             squares += mass[i] * (velocity[d, i] - bulk) ** 2
         relative += 0.5 * squares
     return (
-        kinetic, relative, internal, momentum, volume, lowest_density, highest_density,
-        lowest_energy, highest_energy, rates,
+        kinetic, relative, internal, volume, lowest_density, highest_density, lowest_energy,
+        highest_energy, rates, all_mass,
     )  # fmt: skip

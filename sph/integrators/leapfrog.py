@@ -9,32 +9,34 @@ history records as energy_injected. With the time step limit u/|du/dt| this does
 import numpy as np
 from numba import njit
 
-from sph.compiled import COMPILED, INLINED
+from sph.compiled import COMPILED, FASTMATH, INLINED
 from sph.part import Evolved, Rule
 from sph.state import State
+from sph.threads import ALONE, Team
 
 
-def predict(state: State, evolved: tuple[Evolved, ...], dt: float) -> float:
+def predict(state: State, evolved: tuple[Evolved, ...], dt: float, team: Team = ALONE) -> float:
     """Advance positions by a full step, and velocities and evolved fields by half a step.
 
     Writes the values after a full step to the predicted fields. Returns the energy that was added
     in addition to the rates.
     """
-    s, given = state, 0.0
-    _move(dt, s.position, s.velocity, s.acceleration, s.predicted_velocity)
+    s, n, given = state, state.mass.size, 0.0
+    moved = s.position, s.velocity, s.acceleration, s.predicted_velocity
+    team.chunks(_move, n, dt, *moved)
     for one in evolved:
-        given += one.rule.predict(
-            dt, getattr(s, one.value), getattr(s, one.rate), s.mass, getattr(s, one.predicted)
-        )
+        value, rate, predicted = map(s.rows, (one.value, one.rate, one.predicted))
+        given += sum(team.chunks(one.rule.predict, n, dt, value, rate, s.mass, predicted))
     return given
 
 
-def correct(state: State, evolved: tuple[Evolved, ...], dt: float) -> float:
+def correct(state: State, evolved: tuple[Evolved, ...], dt: float, team: Team = ALONE) -> float:
     """Advance by the second half step with the new rates. Return the energy added beyond these."""
-    s, given = state, 0.0
-    _straight_correct(dt, s.velocity, s.acceleration, s.mass)
+    s, n, given = state, state.mass.size, 0.0
+    team.chunks(_straight_correct, n, dt, s.velocity, s.acceleration, s.mass)
     for one in evolved:
-        given += one.rule.correct(dt, getattr(s, one.value), getattr(s, one.rate), s.mass)
+        value, rate = s.rows(one.value), s.rows(one.rate)
+        given += sum(team.chunks(one.rule.correct, n, dt, value, rate, s.mass))
     return given
 
 
@@ -45,15 +47,22 @@ def keep(state: State, evolved: tuple[Evolved, ...]) -> None:
         getattr(state, one.predicted)[:] = getattr(state, one.value)
 
 
+# Without fused multiply-add, so that the loops with and without branches have the same results.
+ROUNDED = COMPILED | {"fastmath": FASTMATH - {"contract"}}
+
+# Each function below advances particles [first, last). Arrays: (rows, N), where a vector has D rows
+# and a scalar one; mass: (N,). Unsigned indices: Numba would allow for negative ones, which stops
+# the loop from being vectorised.
+
+
 @njit(**COMPILED)
-def _move(dt, position, velocity, acceleration, velocity_full):
+def _move(first, last, dt, position, velocity, acceleration, velocity_full):
     """Advance positions by a full step (eq 1) and velocities by half a step (eq 2).
 
-    velocity_full (D, N) receives the full-step prediction (eq 4).
+    velocity_full receives the full-step prediction (eq 4).
     """
-    D, n = position.shape
-    for d in range(D):
-        for i in range(n):
+    for d in range(position.shape[0]):
+        for i in range(np.uint64(first), np.uint64(last)):
             a = acceleration[d, i]
             v = velocity[d, i]
             position[d, i] += v * dt + 0.5 * a * dt * dt
@@ -62,47 +71,67 @@ def _move(dt, position, velocity, acceleration, velocity_full):
 
 
 @njit(**COMPILED)
-def _straight_predict(dt, value, rate, mass, value_full) -> float:
+def _straight_predict(first, last, dt, value, rate, mass, value_full) -> float:
     """Advance `value` by half a step; write the full step to value_full (eqs 6 and 31)."""
-    flat, flat_rate, flat_full = value.reshape(-1), rate.reshape(-1), value_full.reshape(-1)
-    for i in range(flat.size):
-        start = flat[i]
-        flat_full[i] = start + flat_rate[i] * dt
-        flat[i] = start + 0.5 * flat_rate[i] * dt
+    for d in range(value.shape[0]):
+        for i in range(np.uint64(first), np.uint64(last)):
+            start = value[d, i]
+            value_full[d, i] = start + rate[d, i] * dt
+            value[d, i] = start + 0.5 * rate[d, i] * dt
     return 0.0
 
 
 @njit(**COMPILED)
-def _straight_correct(dt, value, rate, mass) -> float:
-    """Advance `value` by the second half step with the new rate (eqs 29 and 31); equal shapes."""
-    flat, flat_rate = value.reshape(-1), rate.reshape(-1)
-    for i in range(flat.size):
-        flat[i] += 0.5 * flat_rate[i] * dt
+def _straight_correct(first, last, dt, value, rate, mass) -> float:
+    """Advance `value` by the second half step with the new rate (eqs 29 and 31)."""
+    for d in range(value.shape[0]):
+        for i in range(np.uint64(first), np.uint64(last)):
+            value[d, i] += 0.5 * rate[d, i] * dt
     return 0.0
 
 
-@njit(**COMPILED)
-def _positive_predict(dt, energy, rate, mass, energy_full) -> float:
+@njit(**ROUNDED)
+def _positive_predict(first, last, dt, energy, rate, mass, energy_full) -> float:
     """Advance `energy` by half a step (eq 3); write the full step to energy_full (eq 5).
 
     Both are kept positive. Returns the energy added to the half step.
     """
     given = 0.0
-    for i in range(energy.size):
-        energy_full[i], _ = _kept_positive(energy[i], rate[i] * dt)
-        energy[i], extra = _kept_positive(energy[i], 0.5 * rate[i] * dt)
-        given += mass[i] * extra
+    for d in range(energy.shape[0]):
+        if _all_are_straight(first, last, d, dt, energy, rate):
+            for i in range(np.uint64(first), np.uint64(last)):
+                energy_full[d, i] = energy[d, i] + rate[d, i] * dt
+                energy[d, i] += 0.5 * rate[d, i] * dt
+            continue
+        for i in range(first, last):
+            energy_full[d, i], _ = _kept_positive(energy[d, i], rate[d, i] * dt)
+            energy[d, i], extra = _kept_positive(energy[d, i], 0.5 * rate[d, i] * dt)
+            given += mass[i] * extra
     return given
 
 
-@njit(**COMPILED)
-def _positive_correct(dt, energy, rate, mass) -> float:
+@njit(**ROUNDED)
+def _positive_correct(first, last, dt, energy, rate, mass) -> float:
     """Advance `energy` by the second half step (eq 30), kept positive; return the energy added."""
     given = 0.0
-    for i in range(energy.size):
-        energy[i], extra = _kept_positive(energy[i], 0.5 * rate[i] * dt)
-        given += mass[i] * extra
+    for d in range(energy.shape[0]):
+        if _all_are_straight(first, last, d, 0.5 * dt, energy, rate):
+            for i in range(np.uint64(first), np.uint64(last)):
+                energy[d, i] += 0.5 * rate[d, i] * dt
+            continue
+        for i in range(first, last):
+            energy[d, i], extra = _kept_positive(energy[d, i], 0.5 * rate[d, i] * dt)
+            given += mass[i] * extra
     return given
+
+
+@njit(**INLINED)
+def _all_are_straight(first, last, d, dt, energy, rate):
+    """Return whether `_kept_positive` is u + change for all of these particles, as it mostly is."""
+    others = 0
+    for i in range(np.uint64(first), np.uint64(last)):
+        others += rate[d, i] * dt < -0.5 * energy[d, i]
+    return others == 0
 
 
 @njit(**INLINED)

@@ -36,12 +36,15 @@ from sph.compiled import COMPILED
 from sph.neighbours.approach import first_contact
 from sph.part import Part
 from sph.state import State
+from sph.threads import ALONE, Team
 
 # Criteria of every scene; those of parts have the names of the parts.
 CRITERIA = ("signal_speed", "energy", "acceleration", "support", "growth", "end", "approach")
 
 SUPPORT_CHANGE = 0.2
 GROWTH = 1.5
+
+LESS = 1.0 - 1e-15  # if a/b <= c in floating point, then LESS a <= b c
 
 
 class StepLimit(NamedTuple):
@@ -70,36 +73,54 @@ class Past(NamedTuple):
     limit: float
 
 
+# Each function below considers particles [first, last) and returns (value, ID, ...) of the extreme
+# value, and of the lowest ID among equal values. Results of ranges thus combine to that of all
+# particles. Unsigned indices: see leapfrog.py.
+
+
 @njit(**COMPILED)
-def _smallest(support, signal_speed, energy, energy_rate, acceleration, identity, energy_limit):
+def _smallest(
+    first, last, support, signal_speed, energy, energy_rate, acceleration, identity, energy_limit
+):  # fmt: skip
+    """Return the smallest limit but for the Courant number, the particle's ID, the criterion."""
     best = np.inf
     particle = 0
     criterion = 0
-    for i in range(support.size):
-        by_signal = 2.0 * support[i] / signal_speed[i]
-        if by_signal < best or (by_signal == best and identity[i] < particle):
-            best, particle, criterion = by_signal, identity[i], 0
-        # u = 0 does not limit the step: it cannot fall, and any gain is relatively large
-        if energy_limit and energy[i] > 0.0:
-            by_energy = energy[i] / abs(energy_rate[i])
-            if by_energy < best or (by_energy == best and identity[i] < particle):
-                best, particle, criterion = by_energy, identity[i], 1
-        if acceleration is not None:
-            squared = 0.0
-            for d in range(acceleration.shape[0]):
-                squared += acceleration[d, i] ** 2
-            by_acceleration = np.sqrt(support[i] / np.sqrt(squared))
-            if by_acceleration < best or (by_acceleration == best and identity[i] < particle):
-                best, particle, criterion = by_acceleration, identity[i], 2
+    for begin in range(first, last, 64):
+        end = min(begin + 64, last)
+        # First whether any of these particles can have a smaller limit, without branches and
+        # divisions. The factor allows for rounding.
+        near = 0
+        for i in range(np.uint64(begin), np.uint64(end)):
+            near += 2.0 * LESS * support[i] <= best * signal_speed[i]
+            near += LESS * energy[i] <= best * abs(energy_rate[i])
+        if near == 0 and acceleration is None:
+            continue
+        for i in range(begin, end):
+            by_signal = 2.0 * support[i] / signal_speed[i]
+            if by_signal < best or (by_signal == best and identity[i] < particle):
+                best, particle, criterion = by_signal, identity[i], 0
+            # u = 0 does not limit the step: it cannot fall, and any gain is relatively large
+            if energy_limit and energy[i] > 0.0:
+                by_energy = energy[i] / abs(energy_rate[i])
+                if by_energy < best or (by_energy == best and identity[i] < particle):
+                    best, particle, criterion = by_energy, identity[i], 1
+            if acceleration is not None:
+                squared = 0.0
+                for d in range(acceleration.shape[0]):
+                    squared += acceleration[d, i] ** 2
+                by_acceleration = np.sqrt(support[i] / np.sqrt(squared))
+                if by_acceleration < best or (by_acceleration == best and identity[i] < particle):
+                    best, particle, criterion = by_acceleration, identity[i], 2
     return best, particle, criterion
 
 
 @njit(**COMPILED)
-def _largest_change(support, before, identity):
+def _largest_change(first, last, support, before, identity):
     """Return the largest relative change of H in either direction, and the particle's ID."""
     largest = 0.0
     particle = 0
-    for i in range(support.size):
+    for i in range(np.uint64(first), np.uint64(last)):
         change = abs(support[i] - before[i]) / min(support[i], before[i])
         if change > largest or (change == largest and identity[i] < particle):
             largest, particle = change, identity[i]
@@ -107,24 +128,26 @@ def _largest_change(support, before, identity):
 
 
 @njit(**COMPILED)
-def _fastest_change(divergence, identity):
+def _fastest_change(first, last, divergence, identity):
     """Return the largest |div v|, and the particle's ID."""
     largest = 0.0
     particle = 0
-    for i in range(divergence.size):
+    for i in range(np.uint64(first), np.uint64(last)):
         rate = abs(divergence[i])
         if rate > largest or (rate == largest and identity[i] < particle):
             largest, particle = rate, identity[i]
     return largest, particle
 
 
-def limit(bounds: Bounds, state: State, parts: tuple[Part, ...], past: Past | None) -> StepLimit:
+def limit(
+    bounds: Bounds, state: State, parts: tuple[Part, ...], past: Past | None, team: Team = ALONE
+) -> StepLimit:
     """Return the next step; past: None at the start."""
     s = state
-    dt, particle, index = _smallest(
-        s.support, s.signal_speed, s.internal_energy, s.energy_rate,
+    dt, particle, index = min(team.chunks(
+        _smallest, s.support.size, s.support, s.signal_speed, s.internal_energy, s.energy_rate,
         s.acceleration if bounds.acceleration else None, s.id, bounds.energy,
-    )  # fmt: skip
+    ))  # fmt: skip
     dt, criterion = bounds.courant * dt, CRITERIA[index] if index else bounds.criterion
     for part in parts:
         times = part.step_limit(s)
@@ -132,7 +155,7 @@ def limit(bounds: Bounds, state: State, parts: tuple[Part, ...], past: Past | No
         if times is not None and not times.min() >= dt:
             dt, criterion = float(times.min()), part.name
             particle = s.id[~(times > dt)].min()
-    rate, changed = _rate_of_supports(s, past)
+    rate, changed = _rate_of_supports(s, past, team)
     if rate * dt > SUPPORT_CHANGE:
         dt, particle, criterion = SUPPORT_CHANGE / rate, changed, "support"
     if past is not None and dt > GROWTH * past.limit:
@@ -152,15 +175,25 @@ def before_contact(limit: StepLimit, bounds: Bounds, particles: State, domain) -
     return StepLimit(part * limit.dt, int(particle), "approach") if part < 1.0 else limit
 
 
-def _rate_of_supports(state: State, past: Past | None) -> tuple[float, int]:
+def _largest(found: list[tuple[float, int]]) -> tuple[float, int]:
+    """Return the pair (value, ID) of the largest value, and of the lowest ID among equal values."""
+    return found[0] if len(found) == 1 else min(found, key=lambda pair: (-pair[0], pair[1]))
+
+
+def _rate_of_supports(state: State, past: Past | None, team: Team) -> tuple[float, int]:
     """Return the largest |dH/dt|/H, from div v if available, and the particle's ID."""
     divergence = state.get("div_v")
     if divergence is not None:
-        rate, particle = _fastest_change(divergence, state.id)
+        rate, particle = _largest(
+            team.chunks(_fastest_change, divergence.size, divergence, state.id)
+        )
         return rate / state.dimension, particle
     if past is None:
         return 0.0, 0
-    change, particle = _largest_change(state.support, state.support_before, state.id)
+    supports = state.support, state.support_before
+    change, particle = _largest(
+        team.chunks(_largest_change, state.support.size, *supports, state.id)
+    )
     # smaller changes cannot exceed SUPPORT_CHANGE in a step; they may come from the iteration of H,
     # which continues in steps of any length
     return (change / past.dt if change > SUPPORT_CHANGE / GROWTH else 0.0), particle

@@ -5,20 +5,27 @@ children 2k + 1 and 2k + 2 and covers blocks [first, last), split at their middl
 only on positions and IDs, not on the previous order or on threads.
 """
 
+import itertools
+import math
+
 import numpy as np
 from numba import njit
 
-from sph.compiled import COMPILED
-from sph.threads import SMALLEST_RANGE, Team
+from sph.compiled import COMPILED, INLINED
+from sph.threads import CHUNK, SMALLEST_RANGE, Team
 
 BLOCK = 8  # particles per block; 4 and 16 were 20-40 % slower in 3-D (density, rates and lists)
+
+# Smallest number of particles that all threads split together; below, a thread is as fast.
+LARGE = 16 * CHUNK
+SAMPLE = 4096  # number of particles that bound the median
 
 
 def number_of_blocks(n: int) -> int:
     return (n + BLOCK - 1) // BLOCK
 
 
-@njit(**COMPILED)
+@njit(**INLINED)
 def _before(key_a, id_a, key_b, id_b):
     return key_a < key_b or (key_a == key_b and id_a < id_b)
 
@@ -54,7 +61,7 @@ def _select(key, order, identity, a, b, k):
             return
 
 
-@njit(**COMPILED)
+@njit(**INLINED)
 def _longest_axis(position, order, a, b):
     best, axis = -1.0, 0
     if position.shape[0] == 1:
@@ -70,7 +77,7 @@ def _longest_axis(position, order, a, b):
     return axis
 
 
-@njit(**COMPILED)
+@njit(**INLINED)
 def _sort_by_id(order, identity, a, b):
     for p in range(a + 1, b):
         moved = order[p]
@@ -82,41 +89,73 @@ def _sort_by_id(order, identity, a, b):
 
 
 @njit(**COMPILED)
-def _split(position, identity, order, key, first, last, levels):
-    """Split blocks [first, last) `levels` times, or down to single blocks."""
+def _split(first, last, position, identity, order, key, edges, depth):
+    """Split nodes [first, last) `depth` times, or to single blocks.
+
+    Node k of a level covers the blocks [edges[k], edges[k + 1]).
+    """
     n = order.size
-    stack = [(first, last, levels)]
-    while len(stack) > 0:
-        first, last, levels = stack.pop()
-        a, b = first * BLOCK, min(last * BLOCK, n)
-        if last - first <= 1:
-            _sort_by_id(order, identity, a, b)
-            continue
-        if levels == 0:
-            continue
-        middle = (first + last) // 2
-        axis = _longest_axis(position, order, a, b)
-        for p in range(a, b):
-            key[p] = position[axis, order[p]]
-        _select(key, order, identity, a, b, middle * BLOCK)
-        stack.append((first, middle, levels - 1))
-        stack.append((middle, last, levels - 1))
+    stack = np.empty((64, 3), np.int64)  # of nodes: first block, last block, depth
+    for node in range(first, last):
+        # not stack[0] = ..., whose conversion of a tuple to an array takes seconds to compile
+        stack[0, 0], stack[0, 1], stack[0, 2] = edges[node], edges[node + 1], depth
+        size = 1
+        while size > 0:
+            size -= 1
+            begin, end, rest = stack[size, 0], stack[size, 1], stack[size, 2]
+            a, b = begin * BLOCK, min(end * BLOCK, n)
+            if end - begin <= 1:
+                _sort_by_id(order, identity, a, b)
+                continue
+            if rest == 0:
+                continue
+            middle = (begin + end) // 2
+            axis = _longest_axis(position, order, a, b)
+            for p in range(a, b):
+                key[p] = position[axis, order[p]]
+            _select(key, order, identity, a, b, middle * BLOCK)
+            for half, (start, stop) in enumerate(((begin, middle), (middle, end))):
+                stack[size + half, 0] = start
+                stack[size + half, 1] = stop
+                stack[size + half, 2] = rest - 1
+            size += 2
 
 
-@njit(**COMPILED)
-def _split_subtrees(first_tree, last_tree, position, identity, order, key, levels):
-    """Split the subtrees [first_tree, last_tree) of the 2^levels that `_split` left."""
-    blocks = (order.size + BLOCK - 1) // BLOCK
-    for tree in range(first_tree, last_tree):
-        a, b = 0, blocks
-        for level in range(levels - 1, -1, -1):
-            middle = (a + b) // 2
-            if (tree >> level) & 1:
-                a = middle
-            else:
-                b = middle
-        if b > a:
-            _split(position, identity, order, key, a, b, 64)
+def _split_by_team(position, identity, order, key, first, last, team):
+    """Split the node of blocks [first, last) once, by all threads of the team."""
+    a, b = first * BLOCK, min(last * BLOCK, order.size)
+    k = (first + last) // 2 * BLOCK
+    part, axis = order[a:b], 0
+    if position.shape[0] > 1:
+        low, high = zip(*team.run(_extent, b - a, position, part, smallest=CHUNK), strict=True)
+        axis = int(np.argmax(np.max(high, axis=0) - np.min(low, axis=0)))
+    # two bounds that enclose the key at k, except where a sample of the keys is unlikely
+    sample = np.sort(position[axis].take(part[:: max(1, part.size // SAMPLE)]))
+    rank = (k - a) * sample.size // part.size
+    margin = 2 * math.isqrt(sample.size)
+    low, high = sample[max(0, rank - margin)], sample[min(sample.size - 1, rank + margin)]
+    pieces = team.run(_deal, b - a, position[axis], part, low, high, smallest=CHUNK)
+    less, between, more = zip(*pieces, strict=True)
+    np.concatenate([*less, *between, *more], out=part)
+    begin, end = a + sum(map(len, less)), b - sum(map(len, more))
+    if not begin <= k < end:
+        begin, end = a, b
+    key[begin:end] = position[axis].take(order[begin:end])
+    _select(key, order, identity, begin, end, k)
+
+
+def _extent(first, last, position, part):
+    """Return the smallest and the largest position of particles part[first:last], (D,) each."""
+    rows = [row.take(part[first:last]) for row in position]
+    return [row.min() for row in rows], [row.max() for row in rows]
+
+
+def _deal(first, last, coordinate, part, low, high):
+    """Return the particles of part[first:last] below `low`, from there to `high`, and above."""
+    particles = part[first:last]
+    key = coordinate.take(particles)
+    below, above = key < low, key > high
+    return particles[below], particles[~(below | above)], particles[above]
 
 
 def block_order(position: np.ndarray, identity: np.ndarray, team: Team) -> np.ndarray:
@@ -124,9 +163,21 @@ def block_order(position: np.ndarray, identity: np.ndarray, team: Team) -> np.nd
     n = identity.size
     order = np.arange(n)
     key = np.empty(n)
+    arrays = position, identity, order, key
     # about four subtrees per thread balance the load; smaller numbers of blocks are not shared
-    shared = team.threads > 1 and number_of_blocks(n) > 4 * team.threads * SMALLEST_RANGE
+    blocks = number_of_blocks(n)
+    shared = team.threads > 1 and blocks > 8 * SMALLEST_RANGE
     levels = (4 * team.threads - 1).bit_length() if shared else 0
-    _split(position, identity, order, key, 0, number_of_blocks(n), levels)
-    team.run(_split_subtrees, 1 << levels, position, identity, order, key, levels, smallest=1)
+    while levels > 0 and blocks < SMALLEST_RANGE << levels:
+        levels -= 1
+    edges = np.array([0, blocks])
+    for _ in range(levels):
+        nodes = edges.size - 1
+        if nodes < team.threads and n // nodes >= LARGE:
+            for first, last in itertools.pairwise(edges.tolist()):
+                _split_by_team(*arrays, first, last, team)
+        else:
+            team.run(_split, nodes, *arrays, edges, 1, smallest=1)
+        edges = np.sort(np.append(edges, (edges[:-1] + edges[1:]) // 2))
+    team.run(_split, edges.size - 1, *arrays, edges, 64, smallest=1)
     return order

@@ -21,7 +21,7 @@ class EagerTeam(Team):
     """Hands over even a single item, which real teams find too little."""
 
     def run(self, function, items, *arguments, smallest=1):
-        super().run(function, items, *arguments, smallest=1)
+        return super().run(function, items, *arguments, smallest=1)
 
 
 def positions(shape, dimension, count, seed=1):

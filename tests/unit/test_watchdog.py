@@ -286,8 +286,8 @@ def test_collapsing_step_stops_run(begin, monkeypatch):
         simulation.advance(math.inf)
     allowed = step_size.limit
 
-    def shrunk(bounds, particles, parts, past):
-        limit = allowed(bounds, particles, parts, None)
+    def shrunk(bounds, particles, parts, past, team):
+        limit = allowed(bounds, particles, parts, None, team)
         return limit._replace(dt=1e-9 * limit.dt)
 
     monkeypatch.setattr(step_size, "limit", shrunk)

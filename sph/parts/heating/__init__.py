@@ -42,7 +42,7 @@ class Heating(Part):
     def split(self, state, dt):
         before = state.internal_energy
         state.internal_energy = self.source.heated(before, dt)
-        return float(state.mass @ (state.internal_energy - before))
+        return state.total(state.internal_energy - before)
 
     def split_predicted(self, state, dt):
         state.predicted_energy = self.source.heated(state.predicted_energy, dt)
