@@ -1,109 +1,151 @@
-"""Benchmark: what a step costs, by phase, size, threads and scene; what compiling costs.
+"""Benchmark: what a particle update and a step cost, by phase, size, precision and scene.
 
-    python scripts/benchmark.py                 everything (about 15 minutes on two cores)
-    python scripts/benchmark.py engine scenes   some of: engine, scenes, first, sod
+    python scripts/benchmark.py                      all parts (about 30 CPU minutes)
+    python scripts/benchmark.py --quick              the main figures (about 6 CPU minutes)
+    python scripts/benchmark.py engine small         some of: engine, small, whole, start, scenes
+    python scripts/benchmark.py --json FILE          also write the figures to a JSON file
+    python scripts/benchmark.py --against CHECKOUT   also another source tree, runs alternating
+    python scripts/benchmark.py --check              compare with docs/benchmarks
+    python scripts/benchmark.py --check --from FILE  compare a stored result, without measuring
 
-Every figure comes from `sph run` in a process of its own, as a user would run it, and is the median
-of --repeats runs. CPU seconds are user + system over all threads. Prints Markdown.
+Every figure comes from `sph` in a process of its own, as a user runs it, and is the median of
+--repeats runs. CPU time is user + system over all threads. Prints Markdown. Exit codes: 0 done,
+1 slower than the last stored result, 2 wrong arguments, a damaged file or a run that failed.
 """
 
 import argparse
-import os
-import platform
-import resource
 import statistics
-import subprocess
 import sys
-import tempfile
+from collections.abc import Sequence
 from pathlib import Path
 
-from sph.output.run_directory import RunDirectory
+from benchmark_calibration import Calibration
+from benchmark_results import TOLERANCE, changes, last, machine, read, result, slower, write
+from benchmark_runs import (
+    BenchmarkError,
+    Figures,
+    Measurement,
+    Tree,
+    measure,
+    quantity,
+    spread,
+)
+from benchmark_scenes import PARTS
 
-UNIFORM = """
-[problem]
-name = "uniform"
-dimension = {dimension}
-n = {n}
-noise = 0.2
-seed = 1
-[physics]
-gamma = 1.6666666666666667
-eta = 1.6
-balsara = {balsara}
-alpha = {alpha}
-[time]
-end = {end}
-[output]
-interval = {end}
-"""
-SOD = '[problem]\nname = "shock_tube"\nn = 1000\n[time]\nend = 0.2\n[output]\ninterval = 0.05\n'
-STEP = 0.0045 * 64  # of the noisy 3-D lattice times n per axis, by the signal-speed criterion
-PHASES = ("order", "lists", "density", "rates", "predict, correct", "step size, sums")
-CONSTANT, SWITCHED = "1.0", "{ min = 0.1, max = 2.0 }"
+HOME = Path(__file__).resolve().parent.parent
 
 
-def main():
-    parts = {"engine": engine, "scenes": scenes, "first": first_run, "sod": sod}
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("parts", nargs="*", help=", ".join(parts))
-    parser.add_argument("--repeats", type=int, default=3)
-    options = parser.parse_args()
-    print(f"Machine: {processor()}, {os.cpu_count()} cores; Python {platform.python_version()}.\n")
-    for name in options.parts or parts:
-        parts[name](options.repeats)
-
-
-def processor() -> str:
-    """The processor's name, with the widest vector instructions it has."""
+def main(arguments: list[str] | None = None) -> int:
+    options = parsed(arguments)
     try:
-        text = Path("/proc/cpuinfo").read_text()
-    except OSError:
-        return platform.processor()
-    name = next(line.split(":")[1].strip() for line in text.splitlines() if "model name" in line)
-    wide = next((s for s in ("avx512f", "avx2") if s in text), "no AVX2")
-    return f"{name} ({wide})"
+        if options.stored:
+            content = read(options.stored)
+            return report(last(content["machine"], but=options.stored), content)
+        return measured(options)
+    except BenchmarkError as error:
+        print(f"Error: {error}", file=sys.stderr)
+        return 2
 
 
-def uniform(dimension=3, n=64**3, balsara="true", alpha=CONSTANT, steps=12) -> str:
-    per_axis = n ** (1 / dimension)
-    end = steps * STEP / per_axis
-    return UNIFORM.format(dimension=dimension, n=n, balsara=balsara, alpha=alpha, end=end)
+def parsed(arguments: list[str] | None) -> argparse.Namespace:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("parts", nargs="*", help=", ".join(PARTS))
+    parser.add_argument("--repeats", type=int, default=3, help="runs for each figure (default 3)")
+    parser.add_argument("--quick", action="store_true", help="the most important figures only")
+    parser.add_argument("--json", type=Path, help="file to write the figures to")
+    parser.add_argument("--tree", type=Path, default=HOME, help="source tree to measure")
+    parser.add_argument("--against", type=Path, help="another source tree to compare with")
+    parser.add_argument("--check", action="store_true", help="compare with docs/benchmarks")
+    parser.add_argument("--from", type=Path, dest="stored", help="result for --check")
+    options = parser.parse_args(arguments)
+    if unknown := [name for name in options.parts if name not in PARTS]:
+        parser.error(f"{unknown[0]!r} is no part: expected {', '.join(PARTS)}")
+    if options.repeats < 1:
+        parser.error(f"--repeats {options.repeats}: expected at least 1")
+    if options.stored and not options.check:
+        parser.error("--from FILE is for --check")
+    return options
 
 
-def run(text: str, threads=1, cache: Path | None = None) -> dict:
-    """One run: the summary's cost, with CPU and wall seconds of the whole process added."""
-    with tempfile.TemporaryDirectory() as folder:
-        config = Path(folder) / "benchmark.toml"
-        config.write_text(text)
-        environment = dict(os.environ)
-        if cache is not None:
-            environment["NUMBA_CACHE_DIR"] = str(cache)
-        command = [sys.executable, "-m", "sph.cli", "run", str(config), "-o", f"{folder}/run"]
-        before = resource.getrusage(resource.RUSAGE_CHILDREN)
-        begin = os.times().elapsed
-        subprocess.run(
-            [*command, "--threads", str(threads)], check=True, capture_output=True, env=environment
-        )
-        wall = os.times().elapsed - begin
-        after = resource.getrusage(resource.RUSAGE_CHILDREN)
-        summary = RunDirectory(Path(folder, "run")).whole_summary()
-    cost = {**summary["cost"]["session"], "particles": summary["particles"]}
-    cost["process_cpu"] = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
-    cost["process_wall"] = wall
-    return cost
+def measured(options: argparse.Namespace) -> int:
+    trees = [Tree.at(path) for path in (options.tree, options.against) if path]
+    values: list[float] = []  # of the calibration
+    calibration = Calibration()
+
+    def calibrate() -> float:
+        values.append(calibration())
+        return values[-1]
+
+    print(f"Machine: {', '.join(f'{name} {value}' for name, value in machine().items())}.\n")
+    figures: list[Figures] = [{} for _ in trees]
+    done: list[Measurement] = []
+    for name in options.parts or PARTS:
+        for one in PARTS[name](options.quick):
+            if not all(one.precision in tree.precisions for tree in trees):
+                note(f"left out: {one.part} / {one.scene} (no run.precision in a source tree)")
+                continue
+            note(f"{one.part} / {one.scene}")
+            for all_of_tree, new in zip(
+                figures, measure(one, trees, options.repeats, calibrate), strict=True
+            ):
+                all_of_tree.update(new)
+            done.append(one)
+    before, again = None, []
+    if options.check and (before := last(machine(), but=options.json)):
+        again = repeated(before[1], trees[0], figures[0], done, options.repeats, calibrate)
+    for name in options.parts or PARTS:
+        print_part(name, figures[0])
+    print("Calibration, CPU ns per pair: {min:.3f} … {max:.3f}, median {median:.3f}.\n".format(
+        **spread(values)))  # fmt: skip
+    if options.against:
+        print_ratios(trees, figures)
+    content = result(trees[0].path, figures[0], values)
+    if options.json:
+        write(options.json, content)
+    return report(before, content, again) if options.check else 0
 
 
-def median_of(repeats: int, figure, **arguments) -> tuple[dict, dict]:
-    """The run with the median figure, and `figure` of all runs: min, median, max."""
-    runs = sorted((run(**arguments) for _ in range(repeats)), key=figure)
-    values = [figure(one) for one in runs]
-    return runs[len(runs) // 2], {
-        "min": values[0], "median": statistics.median(values), "max": values[-1]
-    }  # fmt: skip
+def note(text: str) -> None:
+    print(text, file=sys.stderr, flush=True)
 
 
-def rate(cost: dict) -> float:
-    return cost["updates_per_cpu_second"]
+def repeated(old: dict, tree: Tree, figures: Figures, done, repeats: int, calibrate) -> list[str]:
+    """Measure again what is slower than the stored result `old`, and add the repeats.
+
+    Return the names of the figures that were slower before.
+    """
+    content = result(tree.path, figures, [1.0])
+    names = [one.name for one in slower(changes(old, content)[0])]
+    for one in done:
+        if any(name.startswith(f"{one.part} / {one.scene} / ") for name in names):
+            note(f"again, as it was slower: {one.part} / {one.scene}")
+            for name, series in measure(one, [tree], repeats, calibrate)[0].items():
+                figures[name].add(series)
+    return names
+
+
+def report(before: tuple[Path, dict] | None, content: dict, again: Sequence[str] = ()) -> int:
+    """Print how a result compares with `before`, a stored one. Return 1 if a figure is slower.
+
+    again: names of the figures that were measured again.
+    """
+    if before is None:
+        print("Check: docs/benchmarks has no result of this kind of machine; nothing compared.")
+        return 0
+    file, old = before
+    both, missing = changes(old, content)
+    slow = slower(both)
+    print(f"Check against {file.name} (commit {str(old['commit'])[:7]}): {len(both)} figures, "
+          f"{len(slow)} slower by more than {100 * TOLERANCE:.0f} %"
+          f"{f', {len(again)} measured again' if again else ''}.")  # fmt: skip
+    for name in missing:
+        print(f"Not measured now: {name}")
+    if slow:
+        print()
+        header("figure", "stored ratio", "now", "slower by")
+        for one in slow:
+            row(one.name, f"{one.before:.4g}", f"{one.after:.4g}", f"{100 * one.relative:.1f} %")
+    return 1 if slow else 0
 
 
 def row(*cells) -> None:
@@ -115,92 +157,55 @@ def header(*cells) -> None:
     row(*("---" for _ in cells))
 
 
-def engine(repeats: int) -> None:
-    """3-D noisy lattice, 125 neighbours: microseconds of CPU an update, by phase."""
-    print("## Engine: 3-D noisy lattice, 125 neighbours, double precision, one global step\n")
-    print("Whole runs of 20 steps with their start (first columns), and what a further step costs:")
-    print("the difference to runs of 4 steps, by phase.\n")
-    run(uniform(n=4096, steps=3))  # fills the cache of compiled code
-    header("particles", "threads", "thousand updates per CPU-s (min … max)", "peak memory (MB)",
-           "CPU µs an update", "wall µs", *(f"{phase} (µs)" for phase in PHASES),
-           "list builds a step")  # fmt: skip
-    peaks = {}
-    for per_axis in (32, 64, 100):
-        for threads in (1, 2):
-            number = per_axis**3
-            cost, rates = median_of(
-                repeats, rate, text=uniform(n=number, steps=20), threads=threads
-            )
-            short, _ = median_of(repeats, rate, text=uniform(n=number, steps=4), threads=threads)
-            micro = {
-                phase: 1e6
-                * (cost["phases_cpu_seconds"][phase] - short["phases_cpu_seconds"][phase])
-                / (cost["updates"] - short["updates"])
-                for phase in PHASES
-            }
-            wall = (cost["wall_seconds"] - short["wall_seconds"]) / (
-                cost["updates"] - short["updates"]
-            )
-            builds = (cost["list_builds"] - short["list_builds"]) / (cost["steps"] - short["steps"])
-            row(
-                f"{per_axis}³", threads,
-                "{median:.0f} ({min:.0f} … {max:.0f})".format(
-                    **{name: value / 1e3 for name, value in rates.items()}
-                ),
-                f"{cost['peak_memory_bytes'] / 1e6:.0f}", f"{sum(micro.values()):.2f}",
-                f"{1e6 * wall:.2f}", *(f"{value:.2f}" for value in micro.values()),
-                f"{builds:.2f}",
-            )  # fmt: skip
-            if threads == 1:
-                peaks[number] = cost["peak_memory_bytes"]
-    (small, least), *_, (large, most) = peaks.items()
-    print(f"\nMemory a particle (slope of the peak from {small} to {large} particles): "
-          f"{(most - least) / (large - small):.0f} bytes.\n")  # fmt: skip
+def print_part(part: str, figures: Figures) -> None:
+    """Print tables of a part: a row for each scene, a column for each quantity."""
+    found: dict[str, dict[str, str]] = {}
+    for name, series in figures.items():
+        if name.startswith(f"{part} / "):
+            _, scene, what = name.split(" / ")
+            found.setdefault(scene, {})[what] = cell(name, series.values)
+    if found:
+        print(f"## {PARTS[part].__doc__}\n")
+    tables: dict[tuple[str, ...], list[str]] = {}
+    for scene, cells in found.items():
+        tables.setdefault(tuple(cells), []).append(scene)
+    for columns, its_scenes in tables.items():
+        units = [quantity(f"{part} / x / {one}").unit for one in columns]
+        titles = [
+            f"{one} ({unit})" if unit else one for one, unit in zip(columns, units, strict=True)
+        ]
+        header("scene", *titles)
+        for scene in its_scenes:
+            row(scene, *(found[scene][one] for one in columns))
+        print()
 
 
-def scenes(repeats: int) -> None:
-    """What a scene does not need costs nothing."""
-    print("## Scenes: time a step, and compiling from an empty cache\n")
-    header("dimension", "alpha", "Balsara", "compile CPU s", "µs CPU an update", "density", "rates")
-    for dimension, n, steps in ((1, 20_000, 40), (2, 160**2, 40), (3, 40**3, 20)):
-        for alpha in (CONSTANT, SWITCHED):
-            for balsara in ("false", "true"):
-                text = uniform(dimension, n, balsara, alpha, steps)
-                with tempfile.TemporaryDirectory() as cache:
-                    compile_seconds = run(text, cache=Path(cache))["compile_cpu_seconds"]
-                    cost, _ = median_of(repeats, rate, text=text, cache=Path(cache))
-                phases, updates = cost["phases_cpu_seconds"], cost["updates"]
-                row(
-                    f"{dimension}-D", "constant" if alpha == CONSTANT else "switched", balsara,
-                    f"{compile_seconds:.1f}", f"{1e6 / cost['updates_per_cpu_second']:.2f}",
-                    *(f"{1e6 * phases[name] / updates:.3f}" for name in ("density", "rates")),
-                )  # fmt: skip
-    print()
+def cell(name: str, values: list[float]) -> str:
+    """The median; of checked figures also the least and the largest."""
+    least, median, most = map(short, spread(values).values())
+    if not quantity(name).checked or len(values) == 1:
+        return median
+    return f"{median} ({least} … {most})"
 
 
-def first_run(_repeats: int) -> None:
-    """The first run on a machine: nothing compiled yet."""
-    print("## First run: CPU seconds of compilation from an empty cache\n")
-    header("scene", "compiling", "whole process")
-    for name, text in (("1-D Sod, N = 1000", SOD), ("3-D, 32³", uniform(n=32**3, steps=3))):
-        with tempfile.TemporaryDirectory() as cache:
-            cost = run(text, cache=Path(cache))
-        row(name, f"{cost['compile_cpu_seconds']:.1f}", f"{cost['process_cpu']:.1f}")
-    print()
+def short(value: float) -> str:
+    """Three digits, without an exponent above 1000."""
+    return f"{value:.0f}" if abs(value) >= 1000.0 else f"{value:.3g}"
 
 
-def sod(repeats: int) -> None:
-    """Sod's tube in 1-D, everything included, with compiled code in the cache."""
-    print("## Sod, 1-D, N = 1000 to t = 0.2: whole process, warm\n")
-    run(SOD)
-    runs = [run(SOD) for _ in range(max(repeats, 5))]
-    header("", "min", "median", "max")
-    for name in ("process_wall", "process_cpu"):
-        values = [one[name] for one in runs]
-        row(name.replace("_", " ") + " (s)",
-            *(f"{f(values):.2f}" for f in (min, statistics.median, max)))  # fmt: skip
+def print_ratios(trees: list[Tree], figures: list[Figures]) -> None:
+    """Print the figures of both trees; each ratio is of runs that followed each other."""
+    mine, other = figures
+    print(f"## {trees[0].path} against {trees[1].path}\n")
+    header("figure", "this", "other", "other / this (min … max)")
+    for name, series in mine.items():
+        if quantity(name).checked and name in other:
+            ratios = [b / a for a, b in zip(series.values, other[name].values, strict=True)]
+            row(name, f"{statistics.median(series.values):.4g}",
+                f"{statistics.median(other[name].values):.4g}",
+                "{median:.3f} ({min:.3f} … {max:.3f})".format(**spread(ratios)))  # fmt: skip
     print()
 
 
 if __name__ == "__main__":
-    main()
+    sys.exit(main())

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 import numpy as np
 from numba.core import event
 
-# The phase in which Numba fills its tables, on first use. `Clock.cpu` does not contain this phase.
+# The phase in which Numba starts, on first use. `Clock.cpu` does not contain this phase.
 STARTING = "start of Numba"
 
 SHORTEST = 1e-9  # seconds: the clock's resolution

@@ -7,31 +7,24 @@ its directory is not writable. Here the directory is named by everything that af
 compiled in every process.
 """
 
-import fcntl
 import functools
 import hashlib
 import inspect
+import io
 import os
 import pickle
-import re
-import shutil
-import stat
 import sys
-import uuid
-from contextlib import suppress
 from pathlib import Path
 
-import platformdirs
-from numba.core import caching, compiler, dispatcher
+from llvmlite import binding
+from numba.core import caching, compiler, dispatcher, environment
+from numba.core.registry import cpu_target
+from numba.core.runtime import rtsys
 from numba.core.serialize import dumps
 
 from sph import fingerprint
+from sph.cache_directory import Directory, place
 from sph.version import __version__
-
-# Number of directories (of other sources, versions, processors or settings) that are kept.
-KEPT = 16
-NAME = re.compile(r"sph-\d[\w.+]*-[0-9a-f]{16}")
-DIGEST = hashlib.sha256().digest_size
 
 
 def install() -> None:
@@ -40,144 +33,45 @@ def install() -> None:
     dispatcher.FunctionCache = _of_function  # type: ignore[attr-defined]
 
 
-def place() -> Path | None:
-    """Return the parent of all cache directories, or None if the user has no cache directory.
-
-    This is NUMBA_CACHE_DIR if that is set, otherwise a subdirectory of the user's cache directory:
-    $XDG_CACHE_HOME/sph or ~/.cache/sph, on macOS ~/Library/Caches/sph.
-    """
-    if chosen := os.environ.get("NUMBA_CACHE_DIR"):
-        return Path(chosen).absolute()
-    base = Path(platformdirs.user_cache_dir("sph"))
-    return base / "compiled" if base.is_absolute() else None  # "~" stays for a user without a home
-
-
 @functools.cache
-def directory() -> "Directory":
+def directory() -> Directory:
     """Return the cache directory of this process."""
     where = place()
     return Directory(where and where / f"sph-{__version__}-{fingerprint.key()}")
 
 
-class Directory:
-    """A cache directory, opened when an entry is first needed.
+def start_numba() -> None:
+    """Start what loaded code needs of Numba: its memory manager.
 
-    An entry is executable code, so the directory is used only if no other user can write to it.
-    Owner and permissions are read from the open descriptor, through which all files are accessed.
+    Numba's own cache imports all modules of Numba with functions that compiled code may call, and
+    SciPy's linear algebra with them, which takes 0.3 CPU seconds. Only compilation needs these.
     """
-
-    def __init__(self, path: Path | None):
-        self.path = path
-        self.reason = ""  # why the directory cannot be used or written
-        self._has_warned = False
-
-    @functools.cached_property
-    def descriptor(self) -> int | None:
-        """Descriptor of the directory, under a shared lock until the process ends, or None."""
-        if self.path is None or not fingerprint.facts()["sources of sph"]:
-            self._refuse("there is no home directory, or there are no source files of sph")
-            return None
-        try:
-            is_new = not self.path.is_dir()
-            if is_new:
-                self.path.parent.mkdir(0o700, parents=True, exist_ok=True)
-                self.path.mkdir(0o700, exist_ok=True)
-            opened = os.open(self.path, os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW)
-        except OSError as error:
-            self._refuse(error.strerror)
-            return None
-        if danger := _danger(os.fstat(opened)):
-            os.close(opened)
-            self._refuse(danger)
-            return None
-        with suppress(OSError):  # a file system without locks, or read-only
-            fcntl.flock(opened, fcntl.LOCK_SH | fcntl.LOCK_NB)
-            os.utime(opened)
-        if is_new:
-            prune(self.path.parent)
-        return opened
-
-    @property
-    def name(self) -> str:
-        return self.path.name if self.path else ""
-
-    def read(self, name: str) -> bytes | None:
-        """Return the content of an entry, or None if it is missing, damaged or not the user's."""
-        try:
-            entry = os.open(name, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK,
-                            dir_fd=self.descriptor)  # fmt: skip
-            with open(entry, "rb") as file:
-                status = os.fstat(entry)
-                if _danger(status) or not stat.S_ISREG(status.st_mode):
-                    return None
-                digest, content = file.read(DIGEST), file.read()
-        except OSError:
-            return None
-        return content if hashlib.sha256(content).digest() == digest else None
-
-    def write(self, name: str, content: bytes) -> None:
-        """Write an entry atomically. If that fails, print a warning once."""
-        unfinished = f"{name}.{uuid.uuid4().hex}"
-        try:
-            entry = os.open(unfinished, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600,
-                            dir_fd=self.descriptor)  # fmt: skip
-            try:
-                with open(entry, "wb") as file:
-                    file.write(hashlib.sha256(content).digest() + content)
-                os.replace(unfinished, name, src_dir_fd=self.descriptor, dst_dir_fd=self.descriptor)
-            except BaseException:
-                with suppress(OSError):
-                    os.unlink(unfinished, dir_fd=self.descriptor)
-                raise
-        except OSError as error:
-            self._refuse(error.strerror)
-            self.warn()
-
-    def warn(self) -> None:
-        """Print once why compiled code cannot be cached."""
-        if not self._has_warned:
-            self._has_warned = True
-            print(
-                f"sph: compiled code cannot be cached in {self.path or 'a cache directory'}: "
-                f"{self.reason}. Every process will compile again.\nTry: set the environment "
-                "variable NUMBA_CACHE_DIR to a directory of your own with 50 MB of free space.",
-                file=sys.stderr,
-                flush=True,
-            )
-
-    def _refuse(self, reason: str | None) -> None:
-        self.reason = reason or "no reason is known"
+    rtsys.initialize(cpu_target.target_context)
 
 
-def _danger(status: os.stat_result) -> str | None:
-    """Return why another user could have written the file or directory, or None."""
-    if status.st_uid != os.geteuid():
-        return f"it belongs to another user (UID {status.st_uid})"
-    if status.st_mode & (stat.S_IWGRP | stat.S_IWOTH):
-        return "other users can write to it"
-    return None
+class _Unpickler(pickle.Unpickler):
+    """Loads compiled code without an import of the modules of Numba whose functions it includes."""
+
+    def find_class(self, module, name):
+        if (module, name) == (environment.__name__, "_rebuild_env"):
+            return _environment
+        return super().find_class(module, name)
 
 
-def prune(place: Path, kept: int = KEPT) -> None:
-    """Remove the least recently used directories in `place` that no process uses; keep `kept`."""
-    with suppress(OSError), os.scandir(place) as entries:
-        ours = [
-            (entry.stat(follow_symlinks=False).st_mtime, entry.path)
-            for entry in entries
-            if NAME.fullmatch(entry.name) and entry.is_dir(follow_symlinks=False)
-        ]
-        for _, path in sorted(ours, reverse=True)[kept:]:
-            _remove_unused(path)
+def _environment(module, constants, name):
+    """Return the environment of a compiled function, as numba.core.environment._rebuild_env does.
 
-
-def _remove_unused(path: str) -> None:
-    with suppress(OSError):
-        opened = os.open(path, os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW)
-        try:
-            fcntl.flock(opened, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            shutil.rmtree(path)
-        finally:
-            os.close(opened)
+    Only object mode uses the globals in it, thus of no function whose module is not imported.
+    """
+    if module in sys.modules:
+        return environment._rebuild_env(module, constants, name)
+    found = environment.lookup_environment(name)
+    if found is None:
+        found = environment.Environment({"__name__": module})  # from which it is stored again
+        found.consts[:] = constants
+        found.env_name = name
+        environment.Environment._memo[name] = found
+    return found
 
 
 def _of_function(function):
@@ -206,17 +100,19 @@ class Entries(caching._Cache):
 
     def load_overload(self, sig, target_context):
         """Return the compiled function, or None if it must be compiled."""
-        target_context.refresh()
         if directory().descriptor is None:
             return None
         key = self._whole_key(sig, target_context.codegen())
         content = directory().read(self._name(key))
         if content is None:
             return None
+        start_numba()
         try:
-            stored, payload = pickle.loads(content)
+            stored, external, payload = _Unpickler(io.BytesIO(content)).load()
             if stored != key:
                 return None
+            if not all(map(binding.address_of_symbol, external)):
+                target_context.refresh()  # imports all modules of Numba, some of which define some
             return compiler.CompileResult._rebuild(target_context, *payload)
         except Exception:  # a damaged entry is compiled again
             return None
@@ -227,7 +123,8 @@ class Entries(caching._Cache):
         # if sources were edited after the start, this code does not belong in the directory
         elif fingerprint.are_sources_unchanged():
             key = self._whole_key(sig, data.codegen)
-            directory().write(self._name(key), dumps((key, data._reduce())))
+            content = dumps((key, _external(data.library), data._reduce()))
+            directory().write(self._name(key), content)
 
     def enable(self): ...
 
@@ -241,6 +138,15 @@ class Entries(caching._Cache):
     def _name(self, key) -> str:
         digest = hashlib.sha256(repr(key).encode()).hexdigest()
         return f"{self._function.__module__}.{self._function.__name__}-{digest[:20]}.code"
+
+
+def _external(library) -> list[str]:
+    """Return the symbols that compiled code takes from elsewhere."""
+    module = library._final_module
+    return [
+        symbol.name for symbol in (*module.functions, *module.global_variables)
+        if symbol.is_declaration and not symbol.name.startswith("llvm.")
+    ]  # fmt: skip
 
 
 @functools.cache

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from sph import declarations, parts, registry
+from sph import declarations, parts, registry, simd
 from sph.config import Config
 from sph.domain import Domain
 from sph.errors import ConfigError
@@ -40,6 +40,11 @@ class Scene:
     @cached_property
     def eos(self):
         return self.physics.eos_model()
+
+    @property
+    def lanes(self):
+        """The arithmetic of sums over neighbours, see `sph.simd`."""
+        return simd.SINGLE if self.config.run.precision == "single" else simd.DOUBLE
 
     @cached_property
     def parts(self) -> tuple[Part, ...]:
@@ -142,7 +147,10 @@ class Scene:
 
     def described(self) -> tuple[list[str], list[str]]:
         """Return descriptions of the compiled physics, and of the omitted physics with reasons."""
-        inside = [f"{self.dimension}-D, {len(self.domain.images.sign)} image(s) of the box"]
+        inside = [
+            f"{self.dimension}-D, {len(self.domain.images.sign)} image(s) of the box",
+            f"sums over neighbours in {self.config.run.precision} precision",
+        ]
         outside = []
         for part in self.all_parts:
             there, left_out = part.described()

@@ -3,9 +3,8 @@
 from typing import Any
 
 import numpy as np
-from numba.core.registry import cpu_target
 
-from sph import declarations, faults, passes, resolution, totals
+from sph import compile_cache, declarations, faults, passes, resolution, totals
 from sph.clock import STARTING, Clock
 from sph.integrators import leapfrog, step_size
 from sph.neighbours.order import number_of_blocks
@@ -33,8 +32,7 @@ class Simulation:
 
     def __init__(self, scene: Scene, particles: State, threads: int, clock: Clock):
         with clock.phase(STARTING):
-            # Numba fills its tables on first use. Filled here, they add no time to other phases.
-            cpu_target.target_context.refresh()
+            compile_cache.start_numba()  # here, where it adds no time to other phases
         self.scene = scene
         self.particles = particles
         self.clock = clock
@@ -257,7 +255,12 @@ class Simulation:
     def neighbours(self) -> passes.Neighbours:
         search: Any = self.search  # whose lists are built before the first pass
         return passes.Neighbours(
-            search.lists, search.images, search.origin.support, search.reach_factor
+            search.lists,
+            search.images,
+            search.boxes,
+            search.origin.support,
+            search.reach_factor,
+            self.scene.lanes,
         )
 
     def _make(self, one: Pass) -> None:
@@ -275,8 +278,7 @@ class Simulation:
                 self._check_found()
                 return
             with self.clock.phase("lists"):
-                self._bring_inside()
-                self.search.widen(p.position, sweep.wanted, p.id)
+                self.search.widen(sweep.wanted, p.id)
             self._steps.has_new_lists = True
         raise faults.starved(self, int(np.argmax(sweep.wanted)))
 

@@ -190,9 +190,13 @@ class State:
                 new = old.take(order, axis=-1)
             else:
                 new = np.empty_like(old)
-                team.run(_take, self.number, old, order, new, smallest=CHUNK)
+                rows = old.reshape(-1, self.number), new.reshape(-1, self.number)
+                team.run(_take, self.number, order, *rows, smallest=CHUNK)
             setattr(self, name, new)
 
 
-def _take(first: int, last: int, old: np.ndarray, order: np.ndarray, new: np.ndarray) -> None:
-    new[..., first:last] = old.take(order[first:last], axis=-1)
+def _take(first: int, last: int, order: np.ndarray, old: np.ndarray, new: np.ndarray) -> None:
+    """Set new[:, first:last] to old[:, order[first:last]]; both (rows, N)."""
+    for source, target in zip(old, new, strict=True):
+        # straight to the target, which NumPy does unless it must raise an error for an index
+        source.take(order[first:last], out=target[first:last], mode="clip")

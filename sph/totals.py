@@ -91,25 +91,28 @@ def of(state, parts, keeps_momentum, team: Team = ALONE) -> Totals:
     keeps_momentum: (D,), 1.0 for axes along which momentum is conserved, 0.0 for others.
     """
     s = state
-    fields = s.mass, s.velocity, s.internal_energy, s.density, s.acceleration, s.energy_rate
-
-    def of_range(first, last):
-        momentum = np.empty(s.dimension)
-        return momentum, *sums(first, last, *fields, keeps_momentum, momentum)
-
-    chunks = team.chunks(of_range, s.number)
-    found = chunks[0] if len(chunks) == 1 else _combined(chunks, keeps_momentum)
-    momentum, kinetic, relative, internal, *others, _ = found
+    chunks = team.chunks(_of_chunk, s.mass.size, s, keeps_momentum)
+    momentum, numbers = chunks[0] if len(chunks) == 1 else _combined(chunks, keeps_momentum)
+    kinetic, relative, internal, *others, _ = numbers
     energies = {
         name: s.total(each, team) for part in parts for name, each in part.energies(s).items()
     }
     return Totals(kinetic, relative, internal, energies, momentum, *others)
 
 
+def _of_chunk(first, last, state, keeps_momentum):
+    s, momentum = state, np.empty(state.position.shape[0])
+    return momentum, sums(
+        first, last, s.mass, s.velocity, s.internal_energy, s.density, s.acceleration,
+        s.energy_rate, keeps_momentum, momentum,
+    )  # fmt: skip
+
+
 def _combined(chunks, keeps_momentum):
     """Return (momentum, results of `sums`) of all particles from those of the chunks."""
-    columns = map(np.array, zip(*chunks, strict=True))
-    momentum, kinetic, relative, internal, volume, low, high, least, most, rates, mass = columns
+    momentum = np.array([each for each, _ in chunks])
+    columns = map(np.array, zip(*(numbers for _, numbers in chunks), strict=True))
+    kinetic, relative, internal, volume, low, high, least, most, rates, mass = columns
     with np.errstate(invalid="ignore", over="ignore"):  # for the watchdog to find
         # sum m (v - bulk)^2 of a chunk is that about its own mean, and M (mean - bulk)^2
         means = keeps_momentum * momentum / mass[:, None]
@@ -119,7 +122,7 @@ def _combined(chunks, keeps_momentum):
             kinetic.sum(), relative.sum() + apart, internal.sum(), volume.sum(), low.min(),
             high.max(), least.min(), most.max(), rates.sum(), mass.sum(),
         )  # fmt: skip
-    return momentum.sum(axis=0), *map(float, numbers)
+    return momentum.sum(axis=0), tuple(map(float, numbers))
 
 
 @njit(**COMPILED)

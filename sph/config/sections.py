@@ -5,6 +5,7 @@ from typing import Annotated, ClassVar, Literal
 
 from pydantic import AfterValidator, Field
 
+from sph.config.restarts import RECORDED
 from sph.problems.base import Section
 
 Count = Annotated[int, Field(ge=1)]
@@ -48,11 +49,19 @@ class Report(Section):
 
 
 class Run(Section):
-    """Resources of the run. No key of this table changes a result."""
+    """Resources and arithmetic of the run."""
 
     restart: ClassVar[str | None] = "free"
     threads: Count | Literal["all"] = Field(
-        "all", description='number of threads; "all" uses every processor that the process may use'
+        "all",
+        description='number of threads; "all" uses every processor that the process may use. The '
+        "number of threads changes no result",
+    )
+    precision: Literal["double", "single"] = Field(
+        "double",
+        description='precision of the sums over neighbours: "single" takes less time and changes '
+        "results by about 1e-6. The state, and sums over all particles, are in double precision",
+        json_schema_extra=RECORDED,
     )
 
 

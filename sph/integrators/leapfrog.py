@@ -21,7 +21,7 @@ def predict(state: State, evolved: tuple[Evolved, ...], dt: float, team: Team = 
     Writes the values after a full step to the predicted fields. Returns the energy that was added
     in addition to the rates.
     """
-    s, n, given = state, state.number, 0.0
+    s, n, given = state, state.mass.size, 0.0
     moved = s.position, s.velocity, s.acceleration, s.predicted_velocity
     team.chunks(_move, n, dt, *moved)
     for one in evolved:
@@ -32,7 +32,7 @@ def predict(state: State, evolved: tuple[Evolved, ...], dt: float, team: Team = 
 
 def correct(state: State, evolved: tuple[Evolved, ...], dt: float, team: Team = ALONE) -> float:
     """Advance by the second half step with the new rates. Return the energy added beyond these."""
-    s, n, given = state, state.number, 0.0
+    s, n, given = state, state.mass.size, 0.0
     team.chunks(_straight_correct, n, dt, s.velocity, s.acceleration, s.mass)
     for one in evolved:
         value, rate = s.rows(one.value), s.rows(one.rate)

@@ -42,7 +42,7 @@ from sph.threads import ALONE, Team
 # Criteria of every scene; those of parts have the names of the parts.
 CRITERIA = ("signal_speed", "energy", "acceleration", "support", "growth", "end", "approach")
 
-SUPPORT, GROW, END, APPROACH = 3, 4, 5, 6  # indices in CRITERIA
+SUPPORT, GROW, END = 3, 4, 5  # indices in CRITERIA
 
 SUPPORT_CHANGE = 0.2
 GROWTH = 1.5
@@ -148,7 +148,7 @@ def limit(
     """Return the next step; past: None at the start."""
     s = state
     dt, particle, index = min(team.chunks(
-        _smallest, s.number, s.support, s.signal_speed, s.internal_energy, s.energy_rate,
+        _smallest, s.support.size, s.support, s.signal_speed, s.internal_energy, s.energy_rate,
         s.acceleration if bounds.acceleration else None, s.id, bounds.energy,
     ))  # fmt: skip
     dt, criterion = bounds.courant * dt, CRITERIA[index] if index else bounds.criterion
@@ -183,13 +183,14 @@ def _rate_of_supports(state: State, past: Past | None, team: Team) -> tuple[floa
     """Return the largest |dH/dt|/H, from div v if available, and the particle's ID."""
     divergence = state.get("div_v")
     if divergence is not None:
-        found = team.chunks(_fastest_change, state.number, divergence, state.id)
+        found = team.chunks(_fastest_change, divergence.size, divergence, state.id)
         change, particle = _largest(found)
         return rate_of_supports(change, True, state.dimension, 0.0), particle
     if past is None:
         return 0.0, 0
     supports = state.support, state.support_before
-    change, particle = _largest(team.chunks(_largest_change, state.number, *supports, state.id))
+    found = team.chunks(_largest_change, state.support.size, *supports, state.id)
+    change, particle = _largest(found)
     return rate_of_supports(change, False, state.dimension, past.dt), particle
 
 

@@ -28,22 +28,22 @@ class CubicSpline(NamedTuple):
         return 40 / (7 * math.pi) if len(dim) == 2 else 8 / math.pi
 
     def w(self, dim, q):
-        u = larger(1.0 - q, 0.0 * q)
-        v = larger(0.5 - q, 0.0 * q)
+        u = larger(1.0 - q, 0.0)
+        v = larger(0.5 - q, 0.0)
         return 2.0 * u * u * u - 8.0 * v * v * v
 
     def dw_over_q(self, dim, q):
         # 18 q - 12 below q = 1/2 and -6 (1 - q)^2 / q above, in one line without cancellation
-        outer = larger(q, 0.0 * q + 0.5)
-        u = larger(1.0 - outer, 0.0 * q)
-        v = larger(0.5 - q, 0.0 * q)
+        outer = larger(q, 0.5)
+        u = larger(1.0 - outer, 0.0)
+        v = larger(0.5 - q, 0.0)
         return -6.0 * u * u / outer - 18.0 * v
 
     def force_over_q(self, dim, q):
         floor = 1 / 3 if self.flattened else 0.0
-        clipped = larger(q, 0.0 * q + floor)
-        outer = larger(clipped, 0.0 * q + 0.5)
-        u = larger(1.0 - outer, 0.0 * q)
-        v = larger(0.5 - clipped, 0.0 * q)
-        # dw/dq at the clipped q, over the true q; 1e-300 matters only for coincident particles
-        return (-6.0 * u * u / outer - 18.0 * v) * (clipped / larger(q, 0.0 * q + 1e-300))
+        clipped = larger(q, floor)
+        outer = larger(clipped, 0.5)
+        u = larger(1.0 - outer, 0.0)
+        v = larger(0.5 - clipped, 0.0)
+        # dw/dq at the clipped q, over the true q; 1e-30 matters only for coincident particles
+        return (-6.0 * u * u / outer - 18.0 * v) * (clipped / larger(q, 1e-30))

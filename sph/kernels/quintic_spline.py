@@ -24,19 +24,19 @@ class QuinticSpline(NamedTuple):
         return 3**7 * 7 / (478 * math.pi) if len(dim) == 2 else 3**7 / (40 * math.pi)
 
     def w(self, dim, q):
-        a = larger(1.0 - q, 0.0 * q)
-        b = larger(2 / 3 - q, 0.0 * q)
-        c = larger(1 / 3 - q, 0.0 * q)
+        a = larger(1.0 - q, 0.0)
+        b = larger(2 / 3 - q, 0.0)
+        c = larger(1 / 3 - q, 0.0)
         a2, b2, c2 = a * a, b * b, c * c
         return a2 * a2 * a - 6.0 * b2 * b2 * b + 15.0 * c2 * c2 * c
 
     def dw_over_q(self, dim, q):
         # For q > 1/3: -5 [a^4 - 6 b^4] / q. For q < 1/3 the polynomial -40/9 + 40 q^2 - 50 q^3,
         # written as its value at 1/3 plus powers of c, so that nothing is divided by a small q.
-        c = larger(1 / 3 - q, 0.0 * q)
-        outer = larger(q, 0.0 * q + 1 / 3)
-        a = larger(1.0 - outer, 0.0 * q)
-        b = larger(2 / 3 - outer, 0.0 * q)
+        c = larger(1 / 3 - q, 0.0)
+        outer = larger(q, 1 / 3)
+        a = larger(1.0 - outer, 0.0)
+        b = larger(2 / 3 - outer, 0.0)
         a2, b2 = a * a, b * b
         return -5.0 * (a2 * a2 - 6.0 * b2 * b2) / outer + 10.0 * c * (5.0 * c * c - c - 1.0)
 

@@ -18,13 +18,13 @@ class WendlandC2(NamedTuple):
         return 7 / math.pi if len(dim) == 2 else 21 / (2 * math.pi)
 
     def w(self, dim, q):
-        u = larger(1.0 - q, 0.0 * q)
+        u = larger(1.0 - q, 0.0)
         if len(dim) == 1:
             return u * u * u * (1.0 + 3.0 * q)  # eq 11
         return (u * u) * (u * u) * (1.0 + 4.0 * q)  # eq 13
 
     def dw_over_q(self, dim, q):
-        u = larger(1.0 - q, 0.0 * q)
+        u = larger(1.0 - q, 0.0)
         if len(dim) == 1:
             return -12.0 * u * u  # eq 12: 3 [u^3 - u^2 (1 + 3q)] = -12 q u^2
         return -20.0 * u * u * u  # eq 14: 4 [u^4 - u^3 (1 + 4q)] = -20 q u^3

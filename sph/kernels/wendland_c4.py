@@ -21,14 +21,14 @@ class WendlandC4(NamedTuple):
         return 9 / math.pi if len(dim) == 2 else 495 / (32 * math.pi)
 
     def w(self, dim, q):
-        u = larger(1.0 - q, 0.0 * q)
+        u = larger(1.0 - q, 0.0)
         u2 = u * u
         if len(dim) == 1:
             return u2 * u2 * u * (1.0 + 5.0 * q + 8.0 * q * q)
         return u2 * u2 * u2 * (1.0 + 6.0 * q + 35 / 3 * q * q)
 
     def dw_over_q(self, dim, q):
-        u = larger(1.0 - q, 0.0 * q)
+        u = larger(1.0 - q, 0.0)
         u2 = u * u
         if len(dim) == 1:
             return -14.0 * u2 * u2 * (1.0 + 4.0 * q)

@@ -21,7 +21,7 @@ class WendlandC6(NamedTuple):
         return 78 / (7 * math.pi) if len(dim) == 2 else 1365 / (64 * math.pi)
 
     def w(self, dim, q):
-        u = larger(1.0 - q, 0.0 * q)
+        u = larger(1.0 - q, 0.0)
         u2 = u * u
         u4 = u2 * u2
         if len(dim) == 1:
@@ -29,7 +29,7 @@ class WendlandC6(NamedTuple):
         return u4 * u4 * (1.0 + 8.0 * q + 25.0 * q * q + 32.0 * q * q * q)
 
     def dw_over_q(self, dim, q):
-        u = larger(1.0 - q, 0.0 * q)
+        u = larger(1.0 - q, 0.0)
         u2 = u * u
         u4 = u2 * u2
         if len(dim) == 1:

@@ -27,7 +27,6 @@ SLACK = 1e-9
 STACK = 27 + 4 * 64
 
 
-@njit(**COMPILED)
 def first_contact(
     position: np.ndarray, velocity: np.ndarray, acceleration: np.ndarray, support: np.ndarray,
     identity: np.ndarray, images: Images, box_length: float, dt: float, reached: float,
@@ -39,17 +38,22 @@ def first_contact(
     support, that a pair starting close to the edge may reach. A step with relative motions above
     box_length is cut to that, with ID 0. Returns (1, 0) if no pair bounds the step.
     """
-    whole = _served(velocity, acceleration, support, images, box_length, dt)
+    whole = _served(velocity, acceleration, support, images.sign, box_length, dt)
     if not whole > 0.0:
         return 1.0, 0
     dt = whole * dt
     moves = dt * (velocity + 0.5 * dt * acceleration)
-    part, particle = _walk(position, moves, support, identity, images, min(reached, FAR))
+    boxes = tree.build(position, support)
+    motion = tree.build(moves, -support)  # whose largest -H is the smallest H
+    # compiled only in runs with gas that has not met
+    part, particle = _walk(
+        boxes, motion, position, moves, support, identity, images, min(reached, FAR)
+    )
     return whole * part, particle
 
 
-@njit(**INLINED)
-def _served(velocity, acceleration, support, images, box_length, dt):
+@njit(**COMPILED)
+def _served(velocity, acceleration, support, sign, box_length, dt):
     """Return the fraction of dt for which images are valid; 0 if relative motions are small."""
     D, n = velocity.shape
     least = np.inf
@@ -62,8 +66,9 @@ def _served(velocity, acceleration, support, images, box_length, dt):
             move = dt * (velocity[d, i] + 0.5 * dt * acceleration[d, i])
             low, high = smaller(low, move), larger(high, move)
         apart = high - low
-        if images.sign[:, d].min() < 0.0:  # at a wall, particles move relative to their images
-            apart = max(apart, 2.0 * high, -2.0 * low)
+        for image in range(sign.shape[0]):
+            if sign[image, d] < 0.0:  # at a wall, particles move relative to their images
+                apart = larger(apart, larger(2.0 * high, -2.0 * low))
         squared += apart * apart
     apart = np.sqrt(squared)
     if not (FAR * least < apart < np.inf):
@@ -71,12 +76,10 @@ def _served(velocity, acceleration, support, images, box_length, dt):
     return min(1.0, box_length / apart)
 
 
-@njit(**INLINED)
-def _walk(position, moves, support, identity, images, reached):
+@njit(**COMPILED)
+def _walk(boxes, motion, position, moves, support, identity, images, reached):
     """Return the first contact as a fraction of the step with displacements `moves` (D, N)."""
     n = support.size
-    boxes = tree.build(position, support)
-    motion = tree.build(moves, -support)  # whose largest -H is the smallest H
     first, last = boxes.first, boxes.last
     best, particle = 1.0, 0
     stack = np.empty((STACK, 3), np.int64)

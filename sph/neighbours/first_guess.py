@@ -3,7 +3,7 @@
 import numpy as np
 from numba import njit
 
-from sph.compiled import COMPILED, INLINED
+from sph.compiled import COMPILED, INLINED, larger, smaller
 from sph.neighbours import BALL, tree
 from sph.neighbours.order import BLOCK
 
@@ -17,18 +17,6 @@ TOO_MANY = 8.0
 HALVINGS = 60
 
 
-@njit(**INLINED)
-def _spacing(lower, upper, n):
-    """Return the spacing s of n particles whose extent is e, from prod(e + s) = n s^D."""
-    D = lower.size
-    extent = upper - lower
-    spacing = extent.max()
-    for _ in range(30):  # a contraction: each iteration at least halves the error
-        spacing = (np.prod(extent + spacing) / n) ** (1 / D)
-    return spacing
-
-
-@njit(**COMPILED)
 def from_spacing(position: np.ndarray, ratio: float) -> np.ndarray:
     """Return guesses (N,) for positions (D, N) in block order.
 
@@ -37,33 +25,65 @@ def from_spacing(position: np.ndarray, ratio: float) -> np.ndarray:
     Guesses that are too large cost memory for lists; small ones cost only a second build.)
     """
     n = position.shape[1]
-    first, last, lower, upper, _ = tree.build(position, np.zeros(n))
-    # coincident particles have no spacing: begin with a small support radius
-    least = 1e-6 * _spacing(lower[0], upper[0], n)
     guess = np.empty(n)
-    for leaf in range(first.size):
-        if last[leaf] - first[leaf] != 1:
-            continue
-        spacing = np.inf
-        node = leaf
-        for _ in range(GUESS_LEVELS):
-            count = min(last[node] * BLOCK, n) - first[node] * BLOCK
-            if count > 1:  # a single particle has no extent
-                spacing = min(spacing, _spacing(lower[node], upper[node], count))
-            node = max(0, (node - 1) // 2)
-        guess[first[leaf] * BLOCK : last[leaf] * BLOCK] = ratio * max(spacing, least)
+    _from_spacing(tree.build(position, np.zeros(n)), ratio, guess)
     return guess
 
 
 @njit(**COMPILED)
+def _from_spacing(boxes, ratio, guess):
+    n = guess.size
+    nodes, D = boxes.lower.shape
+    spacings = np.empty(nodes)
+    extent = np.empty(D)
+    for node in range(nodes):
+        count = min(boxes.last[node] * BLOCK, n) - boxes.first[node] * BLOCK
+        spacings[node] = np.inf
+        if count > 1:  # a single particle has no extent
+            for d in range(D):
+                extent[d] = boxes.upper[node, d] - boxes.lower[node, d]
+            spacings[node] = _spacing(extent, count)
+    # coincident particles have no spacing: begin with a small support radius
+    least = 1e-6 * spacings[0]
+    for leaf in range(nodes):
+        if boxes.last[leaf] - boxes.first[leaf] != 1:
+            continue
+        spacing = np.inf
+        node = leaf
+        for _ in range(GUESS_LEVELS):
+            spacing = min(spacing, spacings[node])
+            node = max(0, (node - 1) // 2)
+        for i in range(boxes.first[leaf] * BLOCK, min(boxes.last[leaf] * BLOCK, n)):
+            guess[i] = ratio * max(spacing, least)
+
+
+@njit(**INLINED)
+def _spacing(extent, n):
+    """Return the spacing s of n particles whose extent is e, from prod(e + s) = n s^D."""
+    D = extent.size
+    spacing = 0.0
+    for d in range(D):
+        spacing = max(spacing, extent[d])
+    for _ in range(30):  # a contraction: each iteration at least halves the error
+        volume = 1.0
+        for d in range(D):
+            volume *= extent[d] + spacing
+        spacing = (volume / n) ** (1 / D)
+    return spacing
+
+
 def trim(position: np.ndarray, ratio: float, least: float, guess: np.ndarray) -> None:
     """Halve guesses (N,) that contain far too many particles, in place; `least` is the lower limit.
 
     position: (D, N) in block order; the intended number is that in a ball of `ratio` spacings.
     """
+    D = len(position)
+    _trim(tree.build(position, guess), position, TOO_MANY * BALL[D - 1] * ratio**D, least, guess)
+
+
+@njit(**COMPILED)
+def _trim(boxes, position, most, least, guess):
     D, n = position.shape
-    boxes = tree.build(position, guess)
-    most = TOO_MANY * BALL[D - 1] * ratio**D
     centre = np.empty(D)
     for leaf in range(boxes.first.size):
         if boxes.last[leaf] - boxes.first[leaf] != 1:
@@ -77,10 +97,11 @@ def trim(position: np.ndarray, ratio: float, least: float, guess: np.ndarray) ->
             if half <= least or _held(boxes, position, centre, H, most) <= most:
                 break
             H = half
-        guess[a:b] = H
+        for i in range(a, b):
+            guess[i] = H
 
 
-@njit(**COMPILED)
+@njit(**INLINED)
 def _held(boxes, position, centre, radius, enough):
     """Return the number of particles in a ball, counted until it exceeds `enough`."""
     D, n = position.shape
@@ -95,8 +116,9 @@ def _held(boxes, position, centre, radius, enough):
         for d in range(D):
             below = boxes.lower[node, d] - centre[d]
             above = centre[d] - boxes.upper[node, d]
-            nearest += max(0.0, below, above) ** 2
-            farthest += min(below, above) ** 2
+            gap, span = larger(0.0, larger(below, above)), smaller(below, above)
+            nearest += gap * gap
+            farthest += span * span
         if nearest > radius * radius:
             continue
         a, b = boxes.first[node] * BLOCK, min(boxes.last[node] * BLOCK, n)
@@ -110,6 +132,7 @@ def _held(boxes, position, centre, radius, enough):
             for j in range(a, b):
                 squared = 0.0
                 for d in range(D):
-                    squared += (position[d, j] - centre[d]) ** 2
+                    r = position[d, j] - centre[d]
+                    squared += r * r
                 held += squared < radius * radius
     return held

@@ -1,7 +1,10 @@
-"""Candidate lists: for each block, all particles and images that may become neighbours.
+"""Neighbour lists: for each superblock, the blocks and images of blocks that it may need.
 
-A list serves all particles of its block. It is valid until a particle has moved, or its support
-radius has grown, by more than the skin allows. A candidate is one integer: particle and image.
+A superblock is a subtree of at most SUPERBLOCK blocks. Its list serves all of its particles: a pass
+copies the listed blocks once, and selects for each block and each particle those candidates that
+are within reach at present (`sph.passes.gather`). A list is complete until a particle has moved, or
+its support radius has grown, by more than the skin allows. Entries beyond the present reach change
+no result, because a pass does not select them. An entry is one integer: block and image.
 """
 
 from typing import NamedTuple
@@ -9,170 +12,220 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from sph.compiled import COMPILED, INLINED, larger, smaller
+from sph.compiled import COMPILED, INLINED
 from sph.domain import Images
-from sph.neighbours.order import BLOCK, number_of_blocks
+from sph.neighbours.order import BLOCK
 from sph.neighbours.tree import Tree
 from sph.threads import SMALLEST_RANGE, Team
 
-CHUNK = 32  # blocks that share a region of the storage
-IMAGE_SHIFT = 26  # low bits of a candidate: the particle; above them the image
-SHORT_IMAGES = 1 << (31 - IMAGE_SHIFT)  # with so many images a candidate fits into 32 bits
-MAX_PARTICLES = 1 << IMAGE_SHIFT
+SUPERBLOCK = 8  # blocks of a superblock, at most
+CHUNK = 4  # superblocks that share a region of the storage
+IMAGE_SHIFT = 23  # low bits of an entry: the block; above them the image
+SHORT_IMAGES = 1 << (31 - IMAGE_SHIFT)  # with so many images an entry fits into 32 bits
+MAX_PARTICLES = BLOCK << IMAGE_SHIFT
 
 
 class Lists(NamedTuple):
-    """Candidates of block b: candidates[start[b] : start[b] + count[b]]."""
+    """The list of superblock s: entries[start[s] : start[s] + count[s]]."""
 
-    start: np.ndarray  # (blocks,) int64
-    count: np.ndarray  # type: ignore[assignment]  # (blocks,) int64, not tuple.count
-    candidates: np.ndarray  # int32, int64 where supports are wider than a thin box
+    first: np.ndarray  # (superblocks + 1,) first block of each superblock, and the number of blocks
+    start: np.ndarray  # (superblocks,) int64
+    count: np.ndarray  # type: ignore[assignment]  # (superblocks,) int64, not tuple.count
+    entries: np.ndarray  # int32, or int64 where supports are wider than a thin box
 
 
 @njit(**COMPILED)
-def _gap(lower_a, upper_a, lower_b, upper_b):
-    """Return the distance between two intervals, 0 if they overlap."""
-    return max(0.0, max(lower_b - upper_a, lower_a - upper_b))
+def superblocks(tree: Tree) -> np.ndarray:
+    """Return the first block of each superblock, in order, and the number of blocks."""
+    first, last = tree.first, tree.last
+    found = np.empty(last[0] + 1, np.int64)
+    stack = np.empty(128, np.int64)
+    stack[0] = 0
+    depth, number = 1, 0
+    while depth > 0:
+        depth -= 1
+        node = stack[depth]
+        if last[node] - first[node] <= SUPERBLOCK:
+            found[number] = first[node]
+            number += 1
+        else:
+            stack[depth] = 2 * node + 2
+            stack[depth + 1] = 2 * node + 1
+            depth += 2
+    found[number] = last[0]
+    return found[: number + 1].copy()
 
 
 @njit(**INLINED)
-def _fill(chunk, dim, tree, position, support, stretch, images, region, start, count, candidates):
-    """Fill the lists of a chunk's blocks into its region; return the room they need."""
-    first, last, lower, upper, largest = tree
+def _squared_gap(dim, lower, upper, a, low, high, b, sign, offset, image):
+    """Return the squared distance between box a and an image of box b, 0 if they overlap."""
+    squared = 0.0
+    for d in range(len(dim)):
+        s, o = sign[image, d], offset[image, d]
+        near = low[b, d] if s > 0.0 else high[b, d]
+        far = high[b, d] if s > 0.0 else low[b, d]
+        gap = max(0.0, max(s * near + o - upper[a, d], lower[a, d] - (s * far + o)))
+        squared += gap * gap
+    return squared
+
+
+@njit(**INLINED)
+def _fill(superblock, dim, tree, leaf, stretch, images, first, entries, begin, room):
+    """Write the list of a superblock to entries[begin:]; return its length.
+
+    leaf (blocks,): node of each block. Nothing is written beyond `room` entries.
+    """
+    node_first, node_last, lower, upper, largest = tree
     sign, offset = images
-    begin_of_region = region[chunk]
-    room = region[chunk + 1] - begin_of_region
-    D = len(dim)  # a compile-time constant, so that loops over it are unrolled
-    n = support.size
-    blocks = start.size
-    nodes_on_stack = np.empty(128, np.int64)
-    box_lower = np.empty(D)
-    box_upper = np.empty(D)
-    members = np.empty((D, BLOCK))
-    supports = np.empty(BLOCK)
-    here = np.empty(D)
-    needed = 0
-    for block in range(chunk * CHUNK, min((chunk + 1) * CHUNK, blocks)):
-        a, b = block * BLOCK, min((block + 1) * BLOCK, n)
-        H_block = 0.0
-        for p in range(a, b):
-            H_block = max(H_block, support[p])
-        for p in range(BLOCK):  # a block that is not full repeats its last particle
-            supports[p] = support[min(a + p, b - 1)]
-            for d in range(D):
-                members[d, p] = position[d, min(a + p, b - 1)]
-        support_least = supports.min()
-        for d in range(D):
-            box_lower[d] = box_upper[d] = position[d, a]
-            for p in range(a + 1, b):
-                box_lower[d] = min(box_lower[d], position[d, p])
-                box_upper[d] = max(box_upper[d], position[d, p])
-        begin = needed
-        for image in range(sign.shape[0]):
-            depth = 1
-            nodes_on_stack[0] = 0
-            while depth > 0:
-                depth -= 1
-                node = nodes_on_stack[depth]
-                squared = 0.0
-                for d in range(D):
-                    s, o = sign[image, d], offset[image, d]
-                    lo = lower[node, d] if s > 0.0 else upper[node, d]
-                    hi = upper[node, d] if s > 0.0 else lower[node, d]
-                    gap = _gap(box_lower[d], box_upper[d], s * lo + o, s * hi + o)
-                    squared += gap * gap
-                reach = stretch * max(H_block, largest[node])
-                if squared >= reach * reach:
-                    continue
-                if last[node] - first[node] > 1:
-                    nodes_on_stack[depth] = 2 * node + 2
-                    nodes_on_stack[depth + 1] = 2 * node + 1
-                    depth += 2
-                    continue
-                for j in range(first[node] * BLOCK, min(last[node] * BLOCK, n)):
-                    squared = farthest = 0.0
-                    for d in range(D):
-                        here[d] = sign[image, d] * position[d, j] + offset[image, d]
-                        gap = _gap(box_lower[d], box_upper[d], here[d], here[d])
-                        squared += gap * gap
-                        farthest += (gap + box_upper[d] - box_lower[d]) ** 2
-                    reach = stretch * max(H_block, support[j])
-                    if squared >= reach * reach:
-                        continue
-                    # j is within reach of the block's box. Near its edge, check each particle.
-                    nearest = farthest - (stretch * support_least) ** 2
-                    if nearest >= 0.0:
-                        for p in range(BLOCK):
-                            squared = 0.0
-                            for d in range(D):
-                                squared += (here[d] - members[d, p]) ** 2
-                            reach = stretch * larger(supports[p], support[j])
-                            nearest = smaller(nearest, squared - reach * reach)
-                    if nearest < 0.0:
-                        if needed < room:
-                            candidates[begin_of_region + needed] = j + (image << IMAGE_SHIFT)
-                        needed += 1
-        start[block] = begin_of_region + begin
-        count[block] = needed - begin
-    return needed
+    a, b = first[superblock], first[superblock + 1]
+    stack = np.empty(128, np.int64)
+    own_lower, own_upper = np.empty((1, len(dim))), np.empty((1, len(dim)))
+    H = 0.0
+    for block in range(a, b):
+        H = max(H, largest[leaf[block]])
+    for d in range(len(dim)):
+        own_lower[0, d], own_upper[0, d] = lower[leaf[a], d], upper[leaf[a], d]
+        for block in range(a + 1, b):
+            own_lower[0, d] = min(own_lower[0, d], lower[leaf[block], d])
+            own_upper[0, d] = max(own_upper[0, d], upper[leaf[block], d])
+    number = 0
+    for image in range(sign.shape[0]):
+        depth = 1
+        stack[0] = 0
+        while depth > 0:
+            depth -= 1
+            node = stack[depth]
+            reach = stretch * max(H, largest[node])
+            squared = _squared_gap(
+                dim, own_lower, own_upper, 0, lower, upper, node, sign, offset, image
+            )
+            if squared >= reach * reach:
+                continue
+            if node_last[node] - node_first[node] > 1:
+                stack[depth] = 2 * node + 2
+                stack[depth + 1] = 2 * node + 1
+                depth += 2
+                continue
+            needed = False
+            for block in range(a, b):
+                own = leaf[block]
+                reach = stretch * max(largest[own], largest[node])
+                squared = _squared_gap(
+                    dim, lower, upper, own, lower, upper, node, sign, offset, image
+                )
+                if squared < reach * reach:
+                    needed = True
+                    break
+            if needed:
+                if number < room:
+                    entries[begin + number] = node_first[node] + (image << IMAGE_SHIFT)
+                number += 1
+    return number
 
 
 @njit(**COMPILED)
 def _fill_chunks(
-    first, last, dim, tree, position, support, stretch, images, region, start, count, candidates,
-    needed,
+    first_chunk, last_chunk, dim, tree, leaf, stretch, images, wanted, first, region, start, count,
+    entries, needed,
 ):  # fmt: skip
-    for chunk in range(first, last):
-        needed[chunk] = _fill(
-            chunk, dim, tree, position, support, stretch, images, region, start, count, candidates
-        )
+    """Fill the lists of `wanted` superblocks; needed: room that each chunk needs."""
+    superblocks = first.size - 1
+    for chunk in range(first_chunk, last_chunk):
+        begin, end = region[chunk], region[chunk + 1]
+        used = 0
+        for one in range(chunk * CHUNK, min((chunk + 1) * CHUNK, superblocks)):
+            if wanted[one]:
+                start[one] = begin + used
+                count[one] = _fill(
+                    one, dim, tree, leaf, stretch, images, first, entries, begin + used,
+                    end - begin - used,
+                )  # fmt: skip
+                used += count[one]
+        needed[chunk] = used
 
 
 @njit(**COMPILED)
-def _regions(room):
-    """Where the region of each chunk begins and, last, where the storage ends."""
-    region = np.zeros(room.size + 1, np.int64)
+def _regions(room, begin):
+    """Return where the region of each chunk begins and, last, where the storage ends."""
+    region = np.empty(room.size + 1, np.int64)
+    region[0] = begin
     for chunk in range(room.size):
         # 15 % to spare: lists rebuilt in a developing flow then rarely have to be built twice
-        region[chunk + 1] = region[chunk] + room[chunk] + room[chunk] // 7 + 64
+        spare = room[chunk] // 7 + 8 if room[chunk] > 0 else 0
+        region[chunk + 1] = region[chunk] + room[chunk] + spare
     return region
 
 
 @njit(**COMPILED)
-def _fits(needed, region):
-    """Whether every chunk's candidates fit into its region."""
-    fits = True
-    for chunk in range(needed.size):
-        fits = fits and needed[chunk] <= region[chunk + 1] - region[chunk]
-    return fits
+def leaves(tree: Tree) -> np.ndarray:
+    """Return the node of each block, (blocks,)."""
+    found = np.empty(tree.last[0], np.int64)
+    for node in range(tree.first.size):
+        if tree.first[node] >= 0 and tree.last[node] - tree.first[node] == 1:
+            found[tree.first[node]] = node
+    return found
 
 
-def build(
-    tree: Tree, position: np.ndarray, support: np.ndarray, skin: float, images: Images, team: Team,
-    room: np.ndarray | None = None,
-) -> tuple[Lists, np.ndarray]:  # fmt: skip
-    """Return the lists of all blocks, and the room (chunks,) that each chunk needed.
+def listed(lists: Lists, which: np.ndarray) -> np.ndarray:
+    """Return which superblocks (superblocks,) are in the lists of the superblocks `which`."""
+    found = np.zeros(which.size, np.bool_)
+    mask = (1 << IMAGE_SHIFT) - 1
+    for one in np.flatnonzero(which):
+        begin = lists.start[one]
+        blocks = lists.entries[begin : begin + lists.count[one]] & mask
+        found[np.searchsorted(lists.first, blocks, side="right") - 1] = True
+    return found
 
-    position: (D, N), support: (N,), in block order; tree: built from them. Candidates are within
-    (1 + skin) max(H_i, H_j) of a particle i of the block. room: the room that an earlier build
-    needed, to size the storage; if it is too small, the lists are built again.
-    """
-    dim = (0,) * position.shape[0]
-    blocks = number_of_blocks(support.size)
-    chunks = (blocks + CHUNK - 1) // CHUNK
-    if room is None or room.size != chunks:
-        room = np.zeros(chunks, np.int64)
-    start = np.empty(blocks, np.int64)
-    count = np.empty(blocks, np.int64)
-    needed = np.empty(chunks, np.int64)
-    while True:
-        region = _regions(room)
-        kind = np.int32 if images.sign.shape[0] <= SHORT_IMAGES else np.int64
-        candidates = np.empty(region[-1], kind)
-        team.run(
-            _fill_chunks, chunks, dim, tree, position, support, 1.0 + skin, images, region, start,
-            count, candidates, needed, smallest=SMALLEST_RANGE // CHUNK,
-        )  # fmt: skip
-        if _fits(needed, region):
-            return Lists(start, count, candidates), needed
-        room = needed.copy()
+
+class Builder:
+    """Builds the lists of one tree: all, or again those of some superblocks."""
+
+    def __init__(self, tree: Tree, skin: float, images: Images, team: Team):
+        self.tree, self.images, self.team = tree, images, team
+        self.stretch = 1.0 + skin
+        self.first = superblocks(tree)
+        self.leaves = leaves(tree)
+
+    def all(self, room: np.ndarray | None = None) -> tuple[Lists, np.ndarray]:
+        """Return the lists, and the room (chunks,) that each chunk needed.
+
+        room: the room that an earlier build needed, to size the storage; if it is too small, the
+        lists are built again.
+        """
+        number = self.first.size - 1
+        start, count = np.empty(number, np.int64), np.empty(number, np.int64)
+        kind = np.int32 if self.images.sign.shape[0] <= SHORT_IMAGES else np.int64
+        empty = Lists(self.first, start, count, np.empty(0, kind))
+        return self._filled(empty, np.ones(number, np.bool_), room)
+
+    def again(self, old: Lists, wanted: np.ndarray) -> Lists:
+        """Return lists of which those of `wanted` (superblocks,) are new.
+
+        The storage of the lists that they replace is not used again before the next full build.
+        """
+        return self._filled(old, wanted, None)[0]
+
+    def boxes(self) -> np.ndarray:
+        """Return the lower and upper corners of the box of each block, (blocks, 2 D)."""
+        tree = self.tree
+        return np.hstack([tree.lower[self.leaves], tree.upper[self.leaves]])
+
+    def _filled(self, old, wanted, room):
+        chunks = (wanted.size + CHUNK - 1) // CHUNK
+        if room is None or room.size != chunks:
+            room = np.zeros(chunks, np.int64)
+        needed = np.empty(chunks, np.int64)
+        begin = old.entries.size
+        dim = (0,) * self.images.sign.shape[1]
+        while True:
+            region = _regions(room, begin)
+            entries = np.empty(region[-1], old.entries.dtype)
+            entries[:begin] = old.entries
+            self.team.run(
+                _fill_chunks, chunks, dim, self.tree, self.leaves, self.stretch, self.images,
+                wanted, self.first, region, old.start, old.count, entries, needed,
+                smallest=max(1, SMALLEST_RANGE // (SUPERBLOCK * CHUNK)),
+            )  # fmt: skip
+            if (needed <= np.diff(region)).all():
+                return old._replace(entries=entries), needed
+            room = needed.copy()

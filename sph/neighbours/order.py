@@ -165,9 +165,12 @@ def block_order(position: np.ndarray, identity: np.ndarray, team: Team) -> np.nd
     key = np.empty(n)
     arrays = position, identity, order, key
     # about four subtrees per thread balance the load; smaller numbers of blocks are not shared
-    shared = team.threads > 1 and number_of_blocks(n) > 4 * team.threads * SMALLEST_RANGE
+    blocks = number_of_blocks(n)
+    shared = team.threads > 1 and blocks > 8 * SMALLEST_RANGE
     levels = (4 * team.threads - 1).bit_length() if shared else 0
-    edges = np.array([0, number_of_blocks(n)])
+    while levels > 0 and blocks < SMALLEST_RANGE << levels:
+        levels -= 1
+    edges = np.array([0, blocks])
     for _ in range(levels):
         nodes = edges.size - 1
         if nodes < team.threads and n // nodes >= LARGE:

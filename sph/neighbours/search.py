@@ -13,11 +13,16 @@ from sph.neighbours.order import BLOCK
 from sph.threads import Team
 
 # Growth of support radii that lists allow between two builds. If exceeded, the pass is repeated.
-GROWTH = 0.03
+GROWTH = 0.05
 
-# Cost of building lists divided by that of the two passes, measured in 3-D with 125 neighbours:
-# (0.2 + 1.4) / (0.93 + 0.85) microseconds per particle.
-BUILD_OVER_PASSES = 0.9
+# Cost of a build (memory order and lists) divided by that of the two passes, and share of the
+# passes that grows with the skin (copying listed blocks, and their selection). Measured in 3-D with
+# 125 neighbours: (0.24 + 0.11) / (0.53 + 0.66) and 0.15 / (0.53 + 0.66) microseconds per particle.
+BUILD_OVER_PASSES = 0.3
+COPYING = 0.12
+
+# Share of superblocks above which all lists are built again instead of those that asked.
+MANY = 0.3
 
 # A support radius requests lists a quarter wider than itself. After this many requests in a step,
 # the guess was wrong by orders of magnitude (coincident particles), and the width is doubled.
@@ -33,17 +38,28 @@ class Origin(NamedTuple):
 
 
 @njit(**COMPILED)
-def _motion(position, support, list_position, list_support):
-    """Return the largest |r - r_list| / H_list and the largest H / H_list."""
+def _motion(position, support, list_position, list_support, boxes):
+    """Return the largest |r - r_list| / H_list and the largest H / H_list.
+
+    boxes (blocks, 2 D) receives the lower and upper corners of the box of each block.
+    """
     D, n = position.shape
     moved = 0.0
     grown = 0.0
-    for i in range(n):
-        squared = 0.0
+    for block in range(boxes.shape[0]):
+        a, b = block * BLOCK, min((block + 1) * BLOCK, n)
         for d in range(D):
-            squared += (position[d, i] - list_position[d, i]) ** 2
-        moved = max(moved, squared / list_support[i] ** 2)
-        grown = max(grown, support[i] / list_support[i])
+            low = high = position[d, a]
+            for i in range(a + 1, b):
+                low = min(low, position[d, i])
+                high = max(high, position[d, i])
+            boxes[block, d], boxes[block, D + d] = low, high
+        for i in range(a, b):
+            squared = 0.0
+            for d in range(D):
+                squared += (position[d, i] - list_position[d, i]) ** 2
+            moved = max(moved, squared / list_support[i] ** 2)
+            grown = max(grown, support[i] / list_support[i])
     return np.sqrt(moved), grown
 
 
@@ -64,11 +80,12 @@ def best_skin(step: float, dimension: int) -> float:
     """Return the skin with the lowest cost per step if particles move `step` supports in a step.
 
     Lists that serve k steps need a skin of GROWTH + 2 (k - 1) step. Each step then costs 1/k of a
-    build, and passes over candidates whose number grows as (1 + skin)^D.
+    build, and the number of listed blocks grows as (1 + skin)^D.
     """
     least, steps = np.inf, 1
     for k in range(1, 21):
-        cost = BUILD_OVER_PASSES / k + (1 + GROWTH + 2 * (k - 1) * step) ** dimension
+        skin = GROWTH + 2 * (k - 1) * step
+        cost = BUILD_OVER_PASSES / k + COPYING * (1 + skin) ** dimension
         if not cost < least:  # the costs are convex in k
             break
         least, steps = cost, k
@@ -84,6 +101,9 @@ class Search:
         self.origin: Origin | None = None
         self.lists: lists.Lists | None = None
         self.images: Images | None = None  # of the domain, which the lists refer to
+        self.boxes: np.ndarray | None = None  # (blocks, 2 D) of the present positions
+        self._builder: lists.Builder | None = None
+        self._tree: tree.Tree | None = None
         self._room: np.ndarray | None = None  # that each chunk of the lists needed
         self.reach_factor = 0.0  # candidates are complete within this factor of the list support
         self._widenings = 0  # in this step
@@ -98,7 +118,9 @@ class Search:
         origin = self.origin
         if self.lists is None or origin is None:
             return True
-        moved, grown = _motion(position, support, origin.position, origin.support)
+        moved, grown = _motion(
+            position, support, origin.position, origin.support, self.boxes
+        )
         self.reach_factor = 1.0 + origin.skin - 2.0 * moved
         return not self.reach_factor > grown
 
@@ -125,25 +147,44 @@ class Search:
 
     def build(self, origin: Origin, identity: np.ndarray) -> None:
         """Build the lists from `origin`, whose arrays are in block order and must not change."""
-        largest = int(np.argmax(origin.support))
-        self.domain.check_reach(origin.support[largest], identity.size, int(identity[largest]))
-        self.images = self.domain.images_within((1 + origin.skin) * origin.support[largest])
-        boxes = tree.build(origin.position, origin.support)
-        self.lists = None  # frees the old lists, the largest arrays, before the new ones are built
-        self.lists, self._room = lists.build(
-            boxes, origin.position, origin.support, origin.skin, self.images, self.team,
-            self._room,
-        )  # fmt: skip
+        self._check_reach(origin, identity)
+        self.lists = None  # frees the old lists before the new ones are built
+        self._tree = tree.build(origin.position, origin.support)
+        self._builder = lists.Builder(self._tree, origin.skin, self.images, self.team)
+        self.lists, self._room = self._builder.all(self._room)
+        self.boxes = self._builder.boxes()
         self.origin = origin
         self.reach_factor = 1.0 + origin.skin
 
-    def widen(self, position: np.ndarray, wanted: np.ndarray, identity: np.ndarray) -> None:
-        """Rebuild at current positions, with `wanted` (blocks,) times the previous list support."""
-        origin = self.origin
-        assert origin is not None  # lists have been built
+    def _check_reach(self, origin: Origin, identity: np.ndarray) -> bool:
+        """Set the images that `origin` needs; return whether they changed."""
+        largest = int(np.argmax(origin.support))
+        self.domain.check_reach(origin.support[largest], identity.size, int(identity[largest]))
+        before = self.images
+        self.images = self.domain.images_within((1 + origin.skin) * origin.support[largest])
+        return self.images is not before
+
+    def widen(self, wanted: np.ndarray, identity: np.ndarray) -> None:
+        """Extend lists where blocks ask for `wanted` (blocks,) times the list support.
+
+        Lists of other superblocks change only if the larger supports reach them.
+        """
+        assert self.origin is not None and self.lists is not None  # lists have been built
         self._widenings += 1
-        factor = np.repeat(np.maximum(wanted, 1.0), BLOCK)[: identity.size]
-        support = origin.support * factor
-        if self._widenings > PATIENCE:
-            support = np.where(factor > 1.0, 2.0 * support, support)
-        self.build(Origin(position.copy(), support, origin.skin), identity)
+        asked = wanted > 1.0
+        factor = np.where(asked, wanted * (2.0 if self._widenings > PATIENCE else 1.0), 1.0)
+        support = self.origin.support * np.repeat(factor, BLOCK)[: identity.size]
+        origin = self.origin._replace(support=support)
+        changed = self._check_reach(origin, identity)
+        first = self.lists.first
+        own = np.logical_or.reduceat(asked, first[:-1])
+        if changed or np.count_nonzero(own) > MANY * own.size:
+            reach_factor, boxes = self.reach_factor, self.boxes
+            self.build(origin, identity)
+            self.reach_factor, self.boxes = reach_factor, boxes
+            return
+        self.origin = origin
+        tree.raise_support(self._tree, self._builder.leaves, asked, support)
+        self.lists = self._builder.again(self.lists, own)
+        reached = lists.listed(self.lists, own)
+        self.lists = self._builder.again(self.lists, reached & ~own)

@@ -12,20 +12,29 @@ from typing import Any, NamedTuple
 import numpy as np
 from numba.extending import is_jitted
 
+from sph.neighbours import lists
+from sph.neighbours.lists import SUPERBLOCK
 from sph.part import Pass
 from sph.state import State
-from sph.threads import Team
+from sph.threads import SMALLEST_RANGE, Team
 
-TINY = 1e-300  # added to r^2: keeps 1/r finite where r_ij = 0, where its factor is zero too
+SMALLEST = SMALLEST_RANGE // SUPERBLOCK  # number of superblocks in a range
 
 
 class Neighbours(NamedTuple):
-    """Candidates of all blocks, complete up to reach_factor times each particle's list_support."""
+    """Lists of all superblocks, complete up to reach_factor times each particle's list_support."""
 
-    lists: tuple
+    lists: lists.Lists
     images: tuple
+    boxes: np.ndarray  # (blocks, 2 D) lower and upper corners of the present positions
     list_support: np.ndarray  # (N,) H when the lists were built
     reach_factor: float
+    lanes: tuple  # the arithmetic of pairs, see `sph.simd`
+
+    @property
+    def superblocks(self) -> int:
+        """The number of superblocks, over which passes run."""
+        return self.lists.count.size
 
 
 class Sweep:
@@ -40,7 +49,6 @@ class Sweep:
         self.state = state
         self.team = team
         self.dim = (0,) * state.dimension
-        self.items = blocks  # that passes run over
         self.wanted = np.empty(blocks)
         self.models = models  # those of the formulation
         self.neighbours: Neighbours | None = None
@@ -64,5 +72,9 @@ class Sweep:
             self.state.swap(*one.swaps)
 
     def run(self, function, models, *arguments) -> None:
-        """Call function(first, last, dim, models, neighbours, *arguments) over ranges of blocks."""
-        self.team.run(function, self.items, self.dim, models, self.neighbours, *arguments)
+        """Call function(first, last, dim, models, neighbours, *arguments) over superblocks."""
+        neighbours: Any = self.neighbours
+        self.team.run(
+            function, neighbours.superblocks, self.dim, models, neighbours, *arguments,
+            smallest=SMALLEST,
+        )  # fmt: skip

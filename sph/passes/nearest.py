@@ -8,38 +8,71 @@ only in the distances.
 import numpy as np
 from numba import njit
 
-from sph.compiled import COMPILED, smaller
+from sph.compiled import COMPILED, INLINED, smaller
 from sph.neighbours.order import BLOCK
-from sph.passes.gather import most_candidates, place_in, unpacked
+from sph.passes.gather import (
+    copy_box,
+    largest_of,
+    longest_list,
+    near_blocks,
+    near_particles,
+    own_box,
+    place_block,
+    scratch,
+    unit,
+    unpacked,
+)
+from sph.simd import filled, lane_max, load, select, width
+from sph.spatial import at, dot, load_spatial, minus, times
 
 
 @njit(**COMPILED)
-def nearest(first_block, last_block, dim, _, neighbours, position, support, mass, density, ratio):
-    """Write ratio (N,), distance to the nearest neighbour over (m/rho)^(1/D), for some blocks.
+def nearest(first, last, dim, _, neighbours, position, support, mass, density, ratio):
+    """Write ratio (N,), distance to the nearest neighbour over (m/rho)^(1/D), for superblocks.
 
     position: (D, N), other arrays (N,). Images of all particles count, including the particle's
     own. inf if there is no neighbour within the support radius.
     """
-    D = len(dim)
-    start, count, candidates = neighbours.lists
-    sign, offset = neighbours.images
-    size = most_candidates(first_block, last_block, count)
-    x = np.empty((D, size))
-    own = np.empty(size, np.int64)  # the particle that the candidate is; -1 for an image
-    for block in range(first_block, last_block):
-        nc = count[block]
-        for k in range(nc):
-            j, image = unpacked(candidates[start[block] + k])
-            own[k] = j if image == 0 else -1
-            place_in(x, k, position, j, dim, sign, offset, image)
-        for i in range(block * BLOCK, min((block + 1) * BLOCK, mass.size)):
-            # not inf: `smaller` is undefined for it
-            farthest = support[i] * support[i]
-            found = farthest
-            for k in range(nc):
-                squared = 0.0
-                for d in range(D):
-                    squared += (position[d, i] - x[d, k]) ** 2
-                found = smaller(found, farthest if own[k] == i else squared)
-            spacing = (mass[i] / density[i]) ** (1.0 / D)
-            ratio[i] = np.sqrt(found) / spacing if found < farthest else np.inf
+    D, lanes, lists = len(dim), neighbours.lanes, neighbours.lists
+    fields = dim + (0,)  # position, number of the particle
+    copied, near, boxes, chosen = scratch(lanes, dim, longest_list(first, last, lists), fields)
+    for superblock in range(first, last):
+        begin, end = lists.first[superblock], lists.first[superblock + 1]
+        i_0, i_end = begin * BLOCK, min(end * BLOCK, mass.size)
+        x_0 = at(dim, position, i_0)
+        per_length = unit(largest_of(support, i_0, i_end))
+        for t in range(lists.count[superblock]):
+            block, image = unpacked(lists.entries[lists.start[superblock] + t])
+            copy_box(dim, boxes, t, neighbours, block, image, x_0, per_length, 0.0)
+            to = t * len(fields) * BLOCK
+            place_block(lanes, dim, copied, to, position, block, neighbours, image, x_0, per_length)
+            _number(copied, to + D * BLOCK, block, image, i_0)
+        for block in range(begin, end):
+            low, high = own_box(dim, neighbours, block, x_0, per_length)
+            i_first, i_last = block * BLOCK, min((block + 1) * BLOCK, mass.size)
+            reach = largest_of(support, i_first, i_last) * per_length
+            blocks = near_blocks(
+                lanes, dim, boxes, lists.count[superblock], low, high, reach, chosen
+            )
+            nc = near_particles(
+                lanes, dim, copied, fields, 0, chosen, blocks, low, high, reach, near
+            )
+            for i in range(i_first, i_last):
+                x_i = times(minus(at(dim, position, i), x_0), per_length)
+                farthest = (support[i] * per_length) ** 2
+                least = filled(lanes, farthest)  # not inf: `smaller` is undefined for it
+                for k in range(0, nc, width(lanes)):
+                    r_ij = minus(x_i, load_spatial(lanes, dim, near, 0, k))
+                    number = load(lanes, near, (D, k))
+                    other = abs(number - (i - i_0)) > 0.5
+                    least = smaller(least, select(other, dot(r_ij, r_ij), farthest))
+                found = -lane_max(-least)
+                spacing = (mass[i] / density[i]) ** (1.0 / D) * per_length
+                ratio[i] = np.sqrt(found) / spacing if found < farthest else np.inf
+
+
+@njit(**INLINED)
+def _number(copied, begin, block, image, i_0):
+    """Write which particles a block has, counted from i_0, to `copied`; -1 for images."""
+    for p in range(BLOCK):
+        copied[begin + p] = block * BLOCK + p - i_0 if image == 0 else -1

@@ -15,6 +15,8 @@ import numpy as np
 from sph import totals
 from sph.clock import SHORTEST
 from sph.errors import NumericalError
+from sph.integrators import step_size
+from sph.passes import SMALLEST
 from sph.steps import driver, rows
 from sph.steps.calls import Unsuitable
 from sph.steps.program import PHASES, SWAPPED, Program, suits
@@ -58,7 +60,8 @@ class Steps:
         s = self._simulation
         if not self._suits or s.steps_here < ORDINARY:
             return False
-        if s.team.shares(s.sweep.items) or s.particles.number > CHUNK:
+        superblocks = s.search.lists.count.size
+        if s.team.shares(superblocks, SMALLEST) or s.particles.number > CHUNK:
             return False
         try:
             self._prepare()
@@ -134,7 +137,7 @@ class Steps:
 
     def _end(self, taken: np.ndarray, is_doubtful: bool) -> None:
         """Set the simulation to the end of steps, and check the last one. Raises NumericalError."""
-        s, last = self._simulation, taken[-1].tolist()
+        s, scene, last = self._simulation, self._simulation.scene, taken[-1].tolist()
         if not self._filled:
             self._first = s.step + 1
         self._filled += len(taken)
@@ -145,9 +148,12 @@ class Steps:
         momentum = taken[-1, driver.MOMENTUM :].copy()
         s.totals = totals.Totals(kinetic, relative, internal, {}, momentum, *others)
         s.energy_drift = last[driver.DRIFT]
-        s.limit = rows.limit_of(s.scene, last)
+        s.limit = rows.limit_of(scene, last)
         try:
             if is_doubtful:
+                bounds, domain = scene.step_bounds, scene.domain
+                s.limit = step_size.before_contact(s.limit, bounds, s.particles, domain)
+                rows.set_limit(taken[-1], s.limit)
                 s.watchdog.check(s)
                 s.columns()
             else:

@@ -12,14 +12,14 @@ from typing import Any
 import numpy as np
 from numba import njit
 
-from sph.integrators.step_size import APPROACH, next_step, rate_of_supports, restricted
+from sph.integrators.step_size import next_step, rate_of_supports, restricted
 from sph.steps.calls import call, read_clock
 from sph.totals import drift_of
 from sph.watchdog import SETTLING, fits_box, is_sound
 
 # Why `take` returned. Python builds stale lists after the prediction of a step, which the next call
-# completes; it completes a step whose first pass requests wider lists; and it repeats the
-# watchdog's checks of a doubtful step.
+# completes; it completes a step whose first pass requests wider lists; and after a doubtful step it
+# looks for gas that would meet in the next one, and repeats the watchdog's checks.
 PAUSED, STALE, WIDER, DOUBTFUL = range(4)
 
 # Columns of the rows, one row a step; the components of momentum follow.
@@ -42,7 +42,8 @@ NOW, LIMIT, GIVEN, LIMITED, REACH, LENGTH, UNTIL = range(7)
 # What the result of a call is: energy injected (GIVES), motion since lists were built (MOVES),
 # whether the first pass found all supports (FINDS), number of supports limited by max_support
 # (COUNTS), sums (SUMS), smallest step (BOUNDS), largest change of supports by div v (DIVERGES) or
-# by the last step (CHANGES), first contact (MEETS), whether particles are within fences (FENCES).
+# by the last step (CHANGES), whether gas that has not met may meet in the next step (MEETS), and
+# whether particles are within fences (FENCES).
 (
     NOTHING, GIVES, MOVES, FINDS, COUNTS, SUMS, BOUNDS, DIVERGES, CHANGES, MEETS, FENCES,
 ) = range(11)  # fmt: skip
@@ -126,10 +127,9 @@ def take(calls, places, words, numbers, fixed, momentum, now, rows, spent, clock
                 )
                 _set(numbers, places, NEXT_DT, limit)
             elif action == MEETS:
-                if result < 1.0:
-                    limit, particle, criterion = result * limit, words[at + 1], APPROACH
+                is_doubtful = is_doubtful or result > 0.0
             elif action == FENCES:
-                is_doubtful = result == 0.0
+                is_doubtful = is_doubtful or result == 0.0
             if calls[k, SWAPS] == 1:
                 swapped = not swapped
                 _exchange(words, places)

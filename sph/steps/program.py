@@ -8,8 +8,7 @@ from numba.extending import is_jitted
 
 from sph import totals
 from sph.integrators import leapfrog, step_size
-from sph.neighbours import search
-from sph.neighbours.approach import first_contact
+from sph.neighbours import approach, search
 from sph.part import IN_PYTHON, Part, Pass
 from sph.scene import Scene
 from sph.steps import driver
@@ -79,7 +78,9 @@ class Program:
     def refresh(self, has_new_lists: bool) -> None:
         """Make the words hold the present arrays."""
         if has_new_lists:
-            words = words_of(self._simulation.neighbours())
+            neighbours = self._simulation.neighbours()
+            self.words[self._places["superblocks"]] = neighbours.superblocks
+            words = words_of(neighbours)
             for place in self._places["neighbours"]:
                 self.words[place : place + len(words)] = words
         present = self._present()
@@ -99,6 +100,7 @@ class Program:
         s, p = self._simulation, self._simulation.particles
         found = {field.name: getattr(p, field.name) for field in p.fields}
         found["list_position"], found["list_support"], _ = s.search.origin
+        found["boxes"] = s.search.boxes
         return found
 
     # --- the calls, in order
@@ -124,20 +126,19 @@ class Program:
             value, rate, predicted = self._rows(one.value, one.rate, one.predicted)
             arrays = value, rate, mass, predicted
             self._add(driver.GIVES, one.rule.predict, *self._all, self._dt, *arrays)
-        lists = self._of("position", "support", "list_position", "list_support")
+        lists = self._of("position", "support", "list_position", "list_support", "boxes")
         self._add(driver.MOVES, search._motion, *lists, phase=LEAPFROG)
 
     def _add_pass(self, one: Pass, lists: Held) -> None:
         s = self._simulation
         phase, swaps = self._phases.index(one.phase), one.swaps is not None
-        arguments = [s.sweep.dim, s.sweep.models, lists, *self._of(*one.arrays)]
+        superblocks = Held("superblocks", lists.value.superblocks)
+        arguments = [0, superblocks, s.sweep.dim, s.sweep.models, lists, *self._of(*one.arrays)]
         arguments += [s.sweep.wanted] * one.widens + [self._dt] * one.takes_step
         if not one.widens:
-            self._add(
-                driver.NOTHING, one.function, 0, s.sweep.items, *arguments, swaps=swaps, phase=phase
-            )
+            self._add(driver.NOTHING, one.function, *arguments, swaps=swaps, phase=phase)
             return
-        self._add(driver.NOTHING, one.function, 0, s.sweep.items, *arguments)
+        self._add(driver.NOTHING, one.function, *arguments)
         wanted = s.sweep.wanted, *self._of("density")
         self._add(driver.FINDS, driver.found, *wanted, swaps=swaps, phase=phase)
         if s.scene.max_support < np.inf:
@@ -154,7 +155,7 @@ class Program:
     def _add_sums(self) -> None:
         scene = self._simulation.scene
         bounds, domain, of = scene.step_bounds, scene.domain, self._of
-        rates, moved = of("acceleration", "energy_rate"), of("position", "velocity", "acceleration")
+        rates = of("acceleration", "energy_rate")
         self._add(
             driver.SUMS, totals.sums, *self._all,
             *of("mass", "velocity", "internal_energy", "density"), *rates, scene.keeps_momentum,
@@ -172,8 +173,8 @@ class Program:
             arrays = of("support", "support_before", "id")
             self._add(driver.CHANGES, step_size._largest_change, *self._all, *arrays)
         self._add(
-            driver.MEETS, first_contact, *moved, *of("support", "id"), domain.images,
-            domain.longest_reach, Held("next_dt", 0.0), 2.0 / 3.0 * bounds.courant, phase=SUMS,
+            driver.MEETS, approach._served, *of("velocity", "acceleration", "support"),
+            domain.images.sign, domain.longest_reach, Held("next_dt", 0.0), phase=SUMS,
         )  # fmt: skip
         if self._fences.size:
             self._add(driver.FENCES, driver.fenced, *of("position"), self._fences)

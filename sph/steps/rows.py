@@ -78,5 +78,12 @@ def limit_of(scene: Scene, row: list[float]) -> StepLimit:
     return StepLimit(row[driver.STEP_LIMIT], int(row[driver.LIMITER]), criterion)
 
 
+def set_limit(row: np.ndarray, limit: StepLimit) -> None:
+    """Write the limit of the next step, reduced by `step_size.before_contact`, to a row."""
+    row[driver.STEP_LIMIT], row[driver.LIMITER] = limit.dt, limit.particle
+    if limit.criterion == "approach":
+        row[driver.CRITERION] = CRITERIA.index(limit.criterion)
+
+
 def _criteria(scene: Scene) -> tuple[str, ...]:
     return scene.step_bounds.criterion, *CRITERIA[1:]

@@ -7,9 +7,11 @@ import pytest
 from states import copy_of
 
 from sph import config as configuration
+from sph import steps
 from sph.clock import Clock
 from sph.domain import Domain
 from sph.integrators import step_size
+from sph.neighbours import approach
 from sph.neighbours.approach import FAR, first_contact
 from sph.neighbours.search import Origin
 from sph.problems import uniform
@@ -186,6 +188,19 @@ def test_cold_clouds_colliding_conserve_energy(begin, monkeypatch, dimension, si
         assert drift(begin(scene), 0.1) > 0.02
 
 
+def test_compiled_steps_are_bounded_by_approach(begin, monkeypatch):
+    monkeypatch.setattr(steps, "ORDINARY", 1)
+    scene = scene_of(*meeting(1, 50), 0.1, max_energy_drift=1e9)
+    one, other = begin(scene), begin(scene)
+    drift(other, 0.1)
+    while one.time < 0.1:
+        one.proceed(0.1, 100)
+    limiters = [name for columns in one.take_rows() for name in columns["limiter"]]
+    assert ["signal_speed", *limiters][:-1] == other.seen
+    assert "approach" in limiters[1:]
+    assert one.particles.position.tobytes() == other.particles.position.tobytes()
+
+
 @pytest.mark.parametrize("boundary", ["mirror", "periodic"])
 def test_cloud_colliding_with_its_image_conserves_energy(begin, monkeypatch, boundary):
     """A cloud flies at a wall; two halves of one at a periodic face."""
@@ -228,6 +243,12 @@ def test_separating_or_resting_clouds_do_not_limit_step(begin):
     assert parting.limit.criterion != "approach"
     resting = begin(scene_of(place, 0 * speed, 1e-8))
     assert resting.limit.criterion != "approach"
+
+
+def test_smooth_flow_does_not_compile_search_for_contacts(begin, monkeypatch):
+    monkeypatch.setattr(approach, "_walk", None)
+    place, speed = meeting(1, 50)
+    begin(scene_of(place, 0 * speed, 1e-8))
 
 
 def test_restart_with_contact_bound_is_bit_for_bit(begin):

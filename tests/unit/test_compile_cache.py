@@ -1,7 +1,6 @@
 """Compiled code on disk: whose it is, what decides it, and what becomes of damage."""
 
 import errno
-import fcntl
 import json
 import os
 import subprocess
@@ -13,8 +12,9 @@ import pytest
 from numba import njit
 
 import sph
-from sph import compile_cache, fingerprint
-from sph.compile_cache import Directory, Entries
+from sph import cache_directory, compile_cache, fingerprint
+from sph.cache_directory import Directory
+from sph.compile_cache import Entries
 from sph.compiled import COMPILED
 
 ROOT = Path(sph.__file__).parents[1]
@@ -213,10 +213,85 @@ def test_unwritable_home_compiles_and_warns(tmp_path):
 def test_no_home_compiles_and_warns(cache, capsys, monkeypatch):
     monkeypatch.delenv("NUMBA_CACHE_DIR", raising=False)
     monkeypatch.setattr("platformdirs.user_cache_dir", lambda name: f"~/.cache/{name}")
-    assert compile_cache.place() is None
+    assert cache_directory.place() is None
     nowhere = Directory(None)
     monkeypatch.setattr(compile_cache, "directory", lambda: nowhere)
     assert_uncached(capsys, "no home directory")
+
+
+# --- loaded code ------------------------------------------------------------------------------
+
+CALLING = """
+import sys
+import numpy as np
+from numba import njit
+from sph.compiled import COMPILED
+
+@njit(**COMPILED)
+def many(n):
+    found = np.empty(n)
+    for i in range(n):
+        found[i] = max(0.0, i - 1.0) ** n
+    return found
+
+@njit(**COMPILED)
+def total(n):
+    return many(n).sum()
+
+@njit(**COMPILED)
+def hashed(text):
+    return hash(text) % 8
+
+def loaded():
+    return [name for name in ("numba.np.linalg", "numba.np.arraymath", "scipy.linalg")
+            if name in sys.modules]
+"""
+
+
+@pytest.fixture
+def ask(tmp_path):
+    """What a new process finds for an expression, with the modules of Numba that it imported."""
+    (tmp_path / "calling.py").write_text(CALLING)
+
+    def asked(*expressions):
+        found = ", ".join(f"({one}, {one.split('(')[0]}.stats.cache_hits.total())"
+                          for one in expressions)  # fmt: skip
+        done = subprocess.run(
+            [sys.executable, "-c", f"from calling import *; print([{found}, loaded()])"],
+            cwd=tmp_path, capture_output=True, text=True, timeout=120,
+            env=os.environ | {"NUMBA_CACHE_DIR": str(tmp_path / "cache"), "PYTHONPATH": str(ROOT),
+                              "PYTHONHASHSEED": "1"},
+        )  # fmt: skip
+        assert done.returncode == 0, done.stderr
+        *values, modules = eval(done.stdout)
+        return values, modules
+
+    return asked
+
+
+@pytest.mark.slow
+def test_loaded_code_runs_without_imports_for_compilation(ask):
+    values, modules = ask("many(3).tolist()")
+    assert values == [([0.0, 0.0, 1.0], 0)]
+    assert modules
+    values, modules = ask("many(3).tolist()")
+    assert values == [([0.0, 0.0, 1.0], 1)]
+    assert modules == []
+
+
+@pytest.mark.slow
+def test_code_compiled_around_loaded_code_is_stored_and_loaded(ask):
+    ask("many(3).tolist()")
+    assert ask("many(3).tolist()", "total(3)")[0] == [([0.0, 0.0, 1.0], 1), (1.0, 0)]
+    assert ask("total(3)") == ([(1.0, 1)], [])
+
+
+@pytest.mark.slow
+def test_loaded_code_finds_symbols_that_modules_of_numba_define(ask):
+    (compiled,), _ = ask("hashed('text')")
+    (loaded,), modules = ask("hashed('text')")
+    assert (loaded[0], compiled[1], loaded[1]) == (compiled[0], 0, 1)
+    assert modules
 
 
 # --- what decides code ------------------------------------------------------------------------
@@ -265,7 +340,7 @@ def test_code_of_other_settings_is_not_used(tmp_path):
     assert in_new_process(tmp_path, **place, NUMBA_NUM_THREADS="1")[0] == [7.0, 1, 0]
     directories = list((tmp_path / "cache").iterdir())
     assert len(directories) == 2
-    assert all(compile_cache.NAME.fullmatch(path.name) for path in directories)
+    assert all(cache_directory.NAME.fullmatch(path.name) for path in directories)
 
 
 def test_code_of_sources_edited_meanwhile_is_not_kept(cache, monkeypatch):
@@ -303,32 +378,3 @@ def test_differences_name_each_fact():
 @pytest.mark.parametrize("then", [None, "", "{", "[]", b"\xff", 3, "[" * 100_000])
 def test_differences_without_facts_are_none(then):
     assert fingerprint.differences(then) is None
-
-
-# --- old directories --------------------------------------------------------------------------
-
-
-def test_prune_removes_oldest_directories_not_in_use(tmp_path):
-    paths = [tmp_path / f"sph-0.1.{k}-{k:016x}" for k in range(6)]
-    for age, path in enumerate(paths):
-        path.mkdir()
-        (path / "entry.code").touch()
-        os.utime(path, (1e9 - age, 1e9 - age))
-    other = tmp_path / "sph-something"
-    other.mkdir()
-    used = Directory(paths[4])
-    assert used.descriptor is not None  # which opens it
-    os.utime(paths[4], (1.0, 1.0))
-    compile_cache.prune(tmp_path, kept=2)
-    assert set(tmp_path.iterdir()) == {paths[0], paths[1], paths[4], other}
-    fcntl.flock(used.descriptor, fcntl.LOCK_UN)
-    compile_cache.prune(tmp_path, kept=2)
-    assert set(tmp_path.iterdir()) == {paths[0], paths[1], other}
-
-
-def test_new_directory_prunes_old_ones(tmp_path, monkeypatch):
-    asked = []
-    monkeypatch.setattr(compile_cache, "prune", asked.append)
-    for _ in range(2):
-        assert Directory(tmp_path / "sph-0-0").descriptor is not None
-    assert asked == [tmp_path]

@@ -21,6 +21,7 @@ DOCUMENTS = [
     ROOT / "README.md",
     ROOT / "CONTRIBUTING.md",
     *sorted((ROOT / "docs").glob("*.md")),
+    ROOT / "docs" / "benchmarks" / "README.md",
     ROOT / "docs" / "studies" / "README.md",
 ]
 every_document = pytest.mark.parametrize(

@@ -12,11 +12,11 @@ import numpy as np
 import pytest
 from marks import slow_except
 
-from sph import config, passes, simulation
+from sph import config, passes, simd, simulation
 from sph.clock import Clock
 from sph.config import physics
 from sph.domain import Domain
-from sph.formulations.gas.smoothing import Converged, FixedPasses
+from sph.formulations.gas.smoothing import Smoothing
 from sph.neighbours import order as ordering
 from sph.neighbours.search import Origin, Search
 from sph.problems import base
@@ -111,9 +111,7 @@ class Case:
 
     @property
     def smoothing(self):
-        if self.passes == "converged":
-            return Converged(TIGHT)
-        return FixedPasses(self.passes, TIGHT)
+        return Smoothing(0 if self.passes == "converged" else self.passes, TIGHT)
 
 
 W, S = "wendland_c2", "cubic_spline"
@@ -243,14 +241,15 @@ def forget(one, state):
         getattr(state, name)[:] = np.nan
 
 
-def make(one, sweep, search):
+def make(one, sweep, search, lanes):
     sweep.neighbours = passes.Neighbours(
-        search.lists, search.images, search.origin.support, search.reach_factor
-    )
+        search.lists, search.images, search.boxes, search.origin.support, search.reach_factor,
+        lanes,
+    )  # fmt: skip
     sweep.make(one)
 
 
-def run_engine(case, gas, skin, threads):
+def run_engine(case, gas, skin, threads, lanes=simd.DOUBLE):
     """(gas in block order, results by name, number of widenings)."""
     team = EagerTeam(threads)
     search = Search(Domain(case.box, case.boundaries), team)
@@ -277,12 +276,12 @@ def run_engine(case, gas, skin, threads):
     widenings = -1
     while np.any(sweep.wanted != 0):
         if sweep.wanted.max() > 0:
-            search.widen(gas.position, sweep.wanted, identity)
-        make(density, sweep, search)
+            search.widen(sweep.wanted, identity)
+        make(density, sweep, search, lanes)
         widenings += 1
     for one in others:
         forget(one, state)
-        make(one, sweep, search)
+        make(one, sweep, search, lanes)
     team.close()
     found = {
         name: state.get(name)

@@ -5,9 +5,12 @@ interpreter checks all rules, because each start of an interpreter that imports 
 """
 
 import json
+import os
 import subprocess
 import sys
 from pathlib import Path
+
+import pytest
 
 import sph
 
@@ -64,3 +67,27 @@ def test_modules_import_heavy_packages_only_when_needed():
     found = json.loads(done.stdout)
     assert len(found) > 3  # the problems are among the rules
     assert {rule: packages for rule, packages in found.items() if packages} == {}
+
+
+RUN = """
+import sys
+from sph.cli import main
+
+main(["run", "tube.toml", "-o", "run", "--force"], standalone_mode=False)
+compilers = {"numba.np.arraymath", "numba.np.linalg", "scipy.linalg"}
+print(sorted((compilers | {"scipy.spatial", "matplotlib"}) & set(sys.modules)))
+"""
+
+
+@pytest.mark.slow
+def test_run_of_compiled_scene_imports_nothing_that_compiles(tmp_path):
+    (tmp_path / "tube.toml").write_text(
+        '[problem]\nname = "shock_tube"\nn = 50\n[time]\nend = 0.01\n[output]\ninterval = 0.01\n'
+    )
+    for _ in range(2):  # the first run compiles, unless another test has
+        done = subprocess.run(
+            [sys.executable, "-c", RUN], cwd=tmp_path, capture_output=True, text=True, timeout=120,
+            env=os.environ | {"PYTHONPATH": str(ROOT)},
+        )  # fmt: skip
+        assert done.returncode == 0, done.stderr
+    assert done.stdout.splitlines()[-1] == "[]"

@@ -201,7 +201,8 @@ def test_compiled_functions_share_their_flags_and_are_all_cached():
     del flags["cache"]
     # its products keep their order, whatever it is inlined into
     exact = found.pop("sph.formulations.gas.thermodynamics._over")
-    assert exact.targetoptions == flags | {"fastmath": False, "forceinline": True}
+    options = {"nogil": True, "error_model": "numpy", "fastmath": False, "forceinline": True}
+    assert exact.targetoptions == plain | options
     assert exact.py_func.__closure__ is None
     for name, function in found.items():
         # what is always inlined is cached with its callers

@@ -6,8 +6,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from sph import compile_cache, resolution, simulation, totals
 from sph import config as configuration
-from sph import resolution, simulation, totals
 from sph.errors import NumericalError
 from sph.formulations.gas.density import density
 from sph.formulations.gas.rates import rates
@@ -64,10 +64,7 @@ def hollow(monkeypatch):
         one = None
         config = configuration.from_text(ALL).override(overrides)
         replace(type(config.problem), "initial", config.problem.initial(Scene(config).eos))
-        context = SimpleNamespace()
-        monkeypatch.setattr(simulation, "cpu_target", SimpleNamespace(target_context=context))
-        context.refresh = None
-        replace(context, "refresh")
+        replace(compile_cache, "start_numba")
         one = Simulation.of_problem(Scene(config), 1, clock)
         one.asked = []  # the blocks that ask for wider lists, one entry a pass over the density
 
@@ -100,7 +97,7 @@ def hollow(monkeypatch):
 
 PHASES = {
     "initial": "initial state",
-    "refresh": "start of Numba",
+    "start_numba": "start of Numba",
     "order": "order",
     "guess": "lists",
     "build": "lists",

@@ -298,3 +298,16 @@ def test_order_on_threads_equals_order_on_one(team, monkeypatch, dimension, kind
             found = order.block_order(position, identity, team(number))
             np.testing.assert_array_equal(found, alone)
             assert len(split) >= min(number - 1, 3)
+
+
+@pytest.mark.parametrize(("smallest", "subtrees"), [(1, 32), (6, 16), (15, 8), (16, 1), (300, 1)])
+def test_order_is_shared_as_far_as_subtrees_are_large_enough(team, monkeypatch, smallest, subtrees):
+    """126 blocks on seven threads: up to 32 subtrees, each of at least `smallest` blocks."""
+    monkeypatch.setattr(order, "SMALLEST_RANGE", smallest)
+    seven, items = team(7), []
+    run = seven.run
+    monkeypatch.setattr(seven, "run", lambda f, n, *a, **k: items.append(n) or run(f, n, *a, **k))
+    position, identity = places("random", 2, 1003), np.arange(1003)
+    found = order.block_order(position, identity, seven)
+    assert items[-1] == subtrees
+    np.testing.assert_array_equal(found, order.block_order(position, identity, team(1)))

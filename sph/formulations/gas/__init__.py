@@ -9,7 +9,7 @@ from sph.eos import is_ideal
 from sph.formulations import Formulation
 from sph.formulations.gas.density import density
 from sph.formulations.gas.rates import rates
-from sph.formulations.gas.smoothing import Converged, FixedPasses
+from sph.formulations.gas.smoothing import Smoothing
 from sph.formulations.gas.weighting import ByMass, ByNumber
 from sph.integrators.leapfrog import POSITIVE
 from sph.part import Evolved, Key, Pass
@@ -17,8 +17,9 @@ from sph.state import COMMON, Field
 
 SCHEMES = "sph.formulations.gas.schemes"
 
-# Relative tolerance of a converged support radius; round-off of the density sum is about 1e-14.
-TOLERANCE = 1e-10
+# Relative tolerance of a converged support radius, by precision of the sums over neighbours. The
+# round-off of a density sum is about 1e-14 in double precision and 1e-7 in single precision.
+TOLERANCES = {"double": 1e-10, "single": 1e-6}
 
 FIELDS = (*COMMON, Field("omega"))
 
@@ -93,10 +94,10 @@ class Gas(Formulation):
         self.fields += tuple(
             Field(name, stored=False) for name in ("div_v", "curl_v") if name in needs
         )
-        self.starting_models = self._models(scene, terms, Converged(TOLERANCE))
-        self.models = self.starting_models
-        if physics.density_passes != "converged":
-            self.models = self._models(scene, terms, FixedPasses(physics.density_passes, TOLERANCE))
+        tolerance = TOLERANCES[scene.config.run.precision]
+        self.starting_models = self._models(scene, terms, Smoothing(0, tolerance))
+        passes = 0 if physics.density_passes == "converged" else physics.density_passes
+        self.models = self._models(scene, terms, Smoothing(passes, tolerance))
         self.eos = self.models.eos
         self.idle = ("check",) if self.eos.lowest_energy is None else ()
         self.passes = self._passes(scene)

@@ -1,110 +1,234 @@
-"""The density pass: eqs 7-8 and 15-17, and the pressure sum of schemes that need one."""
+"""The density pass: eqs 7-8 and 15-17, and the pressure sum of schemes that need one.
+
+Sums over candidates are in the units of the superblock (`sph.passes.gather`).
+"""
 
 import numpy as np
 from numba import njit
 
-from sph.compiled import COMPILED
-from sph.formulations.gas.smoothing import find_support
-from sph.formulations.gas.thermodynamics import dissipation, equation_of_state, summed
-from sph.formulations.gas.weighting import mass_per_weight, weight
+from sph.compiled import COMPILED, INLINED
+from sph.formulations.gas.smoothing import WEIGHT, R, find_support
+from sph.formulations.gas.thermodynamics import summed, thermodynamics
+from sph.formulations.gas.weighting import copy_weights, mass_per_weight, weight
 from sph.kernels import dw_over_q, normalisation, w
 from sph.neighbours.order import BLOCK
-from sph.passes.gather import copy_in, most_candidates, place_in, unpacked
+from sph.passes.gather import (
+    FAR,
+    TINY,
+    also,
+    copy_box,
+    copy_products,
+    copy_vectors,
+    fastest,
+    largest_of,
+    longest_list,
+    near_blocks,
+    near_particles,
+    own_box,
+    place_block,
+    scratch,
+    unit,
+    unpacked,
+)
+from sph.simd import count, filled, front, inverse_sqrt, lane_sum, load, pick, rows, store, width
+from sph.spatial import (
+    at,
+    cross,
+    curl_dim,
+    dot,
+    lane_sums,
+    load_spatial,
+    minus,
+    pick_spatial,
+    plus,
+    store_spatial,
+    times,
+    zeros,
+)
+
+# Candidates of a particle are first selected within this multiple of its support radius before the
+# step, and within the reach of the lists if the new support radius is larger.
+MARGIN = 1.02
+
+
+# Further rows of the candidates of one particle: v_ij . r_ij, m_j u_j, v_ij x r_ij.
+V_DOT_R, MU, CURL = 2, 3, 4
 
 
 @njit(**COMPILED)
 def density(
-    first_block, last_block, dim, models, neighbours, position, velocity, mass, energy,
-    support_before, alpha, support, rho, Omega, pressure, energy_shift, div_v, curl_v,
-    pressure_term, sound_speed, balsara, alpha_rate, wanted,
+    first, last, dim, models, neighbours, position, velocity, mass, energy, support_before, alpha,
+    support, rho, Omega, pressure, energy_shift, div_v, curl_v, pressure_term, sound_speed, balsara,
+    alpha_rate, wanted,
 ):  # fmt: skip
-    """Density pass over blocks [first_block, last_block), with the quantities that follow from it.
+    """Density pass over superblocks [first, last), with the quantities that follow from it.
 
     wanted (blocks,): see `sph.passes.Sweep`. A particle whose support was not found gets a density
     of -1. An array is None if the scene does not need it: pressure, energy_shift (of schemes that
     sum the pressure), div_v, curl_v, balsara, alpha and alpha_rate.
     """
-    D = len(dim)
-    kernel, weighting = models.kernel, models.weighting
-    support_ratio = models.support_ratio
-    start, count, candidates = neighbours.lists
-    sign, offset = neighbours.images
-    C = normalisation(kernel, dim)
-    size = most_candidates(first_block, last_block, count)
-    x = np.empty((D, size))
-    v = np.empty((D, size))
-    m = np.empty(size)
-    r = np.empty(size)
-    mu = np.empty(size if energy_shift is not None else 0)
-    for block in range(first_block, last_block):
-        if wanted[block] == 0.0:
+    D, lanes = len(dim), neighbours.lanes
+    weighting, lists = models.weighting, neighbours.lists
+    fields = dim + (0,)  # position, weight, velocity, m u
+    fields = also(also(fields, div_v, dim), energy_shift, (0,))
+    copied, near, boxes, chosen = scratch(lanes, dim, longest_list(first, last, lists), fields)
+    pairs = rows(lanes, CURL + 3, near.shape[1])
+    settled = np.empty(BLOCK, np.bool_)
+    for superblock in range(first, last):
+        begin, end = lists.first[superblock], lists.first[superblock + 1]
+        if not wanted[begin:end].any():
             continue
-        nc = count[block]
-        for k in range(nc):
-            j, image = unpacked(candidates[start[block] + k])
-            m[k] = weight(weighting, mass[j])
-            place_in(x, k, position, j, dim, sign, offset, image)
+        i_0, i_end = begin * BLOCK, min(end * BLOCK, mass.size)
+        x_0, v_0 = at(dim, position, i_0), at(dim, velocity, i_0)
+        per_length = unit(largest_of(support_before, i_0, i_end))
+        per_velocity = unit(fastest(dim, velocity, i_0, i_end))
+        per_mass = unit(weight(weighting, largest_of(mass, i_0, i_end)))
+        per_energy = per_mass * unit(largest_of(energy, i_0, i_end))
+        per_density = per_mass / per_length**D
+        number = lists.count[superblock]
+        for t in range(number):
+            block, image = unpacked(lists.entries[lists.start[superblock] + t])
+            copy_box(dim, boxes, t, neighbours, block, image, x_0, per_length, 0.0)
+            to = t * len(fields) * BLOCK
+            place_block(lanes, dim, copied, to, position, block, neighbours, image, x_0, per_length)
+            copy_weights(lanes, copied, to + D * BLOCK, weighting, mass, block, per_mass)
             if div_v is not None:
-                copy_in(v, k, velocity, j, dim, sign, image)
-            if energy_shift is not None:
-                mu[k] = mass[j] * energy[j]
-        wanted[block] = 0.0
-        for i in range(block * BLOCK, min((block + 1) * BLOCK, mass.size)):
-            for k in range(nc):
-                squared = 0.0
-                for d in range(D):
-                    squared += (position[d, i] - x[d, k]) ** 2
-                r[k] = np.sqrt(squared)
-            list_support = neighbours.list_support[i]
-            H, rho_i, Omega_i, needed = find_support(
-                models.smoothing, kernel, dim, r, m, nc, weight(weighting, mass[i]),
-                support_before[i], support_ratio * models.eta,
-                neighbours.reach_factor * list_support, models.max_support,
-            )  # fmt: skip
-            rho_i *= mass_per_weight(weighting, mass[i])
-            support[i], rho[i], Omega[i] = H, rho_i, Omega_i
-            if needed > 0.0:
-                wanted[block] = max(wanted[block], needed / list_support)
-                continue
-            c = equation_of_state(
-                i, models, rho_i, Omega_i, energy, pressure, pressure_term, sound_speed
-            )
-            if energy_shift is not None:
-                H_inv = 1.0 / H
-                sum_w = sum_dw = 0.0
-                for k in range(nc):
-                    q = r[k] * H_inv
-                    sum_w += mu[k] * w(kernel, dim, q)
-                    sum_dw += mu[k] * (q * q) * dw_over_q(kernel, dim, q)
-                scale = C * H_inv**D
-                change = -scale * (sum_w + sum_dw / D)  # H/D d/dH of the sum, by eq 10
-                summed(
-                    i, models, energy, scale * sum_w, change / (Omega_i * rho_i), pressure,
-                    pressure_term, energy_shift,
+                copy_vectors(
+                    lanes, dim, copied, to + (D + 1) * BLOCK, velocity, block, neighbours, image, v_0,
+                    per_velocity,
                 )  # fmt: skip
-            if div_v is not None:
-                H_inv = 1.0 / H
-                scale = -C * H_inv ** (D + 2) / (Omega_i * rho_i)
-                scale *= mass_per_weight(weighting, mass[i])  # 1/n_i instead of 1/rho_i
-                total = curl_x = curl_y = curl_z = 0.0
-                for k in range(nc):
-                    m_dw = m[k] * dw_over_q(kernel, dim, r[k] * H_inv)
-                    v_dot_r = 0.0
-                    for d in range(D):
-                        v_dot_r += (velocity[d, i] - v[d, k]) * (position[d, i] - x[d, k])
-                    total += m_dw * v_dot_r
-                    if curl_v is not None:
-                        r_x, r_y = position[0, i] - x[0, k], position[1, i] - x[1, k]
-                        v_x, v_y = velocity[0, i] - v[0, k], velocity[1, i] - v[1, k]
-                        curl_z += m_dw * (v_x * r_y - v_y * r_x)
-                        if D == 3:
-                            r_z, v_z = position[2, i] - x[2, k], velocity[2, i] - v[2, k]
-                            curl_x += m_dw * (v_y * r_z - v_z * r_y)
-                            curl_y += m_dw * (v_z * r_x - v_x * r_z)
-                div = scale * total  # eq 16, whose sign is a misprint: v_ij = v_i - v_j
-                div_v[i] = div
-                curl = 0.0
-                if curl_v is not None:
-                    curl = abs(scale) * np.sqrt(curl_x**2 + curl_y**2 + curl_z**2)  # eq 17
-                    curl_v[i] = curl
-                dissipation(i, models, H, c, div, curl, alpha, balsara, alpha_rate)
+            if energy_shift is not None:
+                last_field = to + (len(fields) - 1) * BLOCK
+                copy_products(lanes, copied, last_field, mass, energy, block, per_energy)
+        for block in range(begin, end):
+            if wanted[block] == 0.0:
+                continue
+            low, high = own_box(dim, neighbours, block, x_0, per_length)
+            i_first, i_last = block * BLOCK, min((block + 1) * BLOCK, mass.size)
+            for attempt in range(2):
+                reach = 0.0
+                for i in range(i_first, i_last):
+                    reach = max(reach, _reach(attempt, support_before, neighbours, i) * per_length)
+                blocks = near_blocks(lanes, dim, boxes, number, low, high, reach, chosen)
+                nc = near_particles(
+                    lanes, dim, copied, fields, 0, chosen, blocks, low, high, reach, near
+                )
+                wanted[block] = 0.0
+                for i in range(i_first, i_last):
+                    if attempt > 0 and settled[i % BLOCK]:
+                        continue
+                    reach = _reach(attempt, support_before, neighbours, i) * per_length
+                    x_i = times(minus(at(dim, position, i), x_0), per_length)
+                    v_i = times(minus(at(dim, velocity, i), v_0), per_velocity)
+                    n = _select(
+                        lanes, dim, near, nc, len(fields) - 1, x_i, v_i, reach, div_v, curl_v, energy_shift,
+                        pairs,
+                    )  # fmt: skip
+                    H, n_i, Omega_i, needed = find_support(
+                        models.smoothing, lanes, models.kernel, dim, pairs, n,
+                        weight(weighting, mass[i]) * per_mass, support_before[i] * per_length,
+                        models.support_ratio * models.eta, reach, models.max_support * per_length,
+                    )  # fmt: skip
+                    H_inv = 1.0 / H
+                    rho_i = n_i / per_density * mass_per_weight(weighting, mass[i])
+                    support[i], rho[i], Omega[i] = H / per_length, rho_i, Omega_i
+                    settled[i % BLOCK] = not needed > 0.0
+                    if needed > 0.0:
+                        needed /= per_length * neighbours.list_support[i]
+                        wanted[block] = max(wanted[block], needed)
+                        continue
+                    if energy_shift is not None:
+                        E, slope = _energy_density(lanes, models.kernel, dim, pairs, n, H_inv)
+                        scale = per_length**D / per_energy
+                        summed(
+                            i, models, energy, scale * E, scale * slope / (Omega_i * rho_i),
+                            pressure, pressure_term, energy_shift,
+                        )  # fmt: skip
+                    if div_v is not None:
+                        scale = per_length / (per_velocity * Omega_i * n_i)
+                        div, curl = _motion(lanes, models.kernel, dim, pairs, n, H_inv, curl_v)
+                        div_v[i] = scale * div
+                        if curl_v is not None:
+                            curl_v[i] = scale * curl
+                if not wanted[block] > 0.0:
+                    break
+            thermodynamics(
+                lanes, models, block, energy, support, rho, Omega, div_v, curl_v, alpha,
+                energy_shift, pressure, pressure_term, sound_speed, balsara, alpha_rate,
+            )  # fmt: skip
+
+
+@njit(**INLINED)
+def _reach(attempt, support_before, neighbours, i):
+    """Return the radius within which candidates of particle i are selected."""
+    complete = neighbours.reach_factor * neighbours.list_support[i]
+    return complete if attempt > 0 else min(MARGIN * support_before[i], complete)
+
+
+@njit(**INLINED)
+def _select(
+    lanes, dim, near, nc, mu_row, x_i, v_i, reach, div_v, curl_v, energy_shift, pairs
+):  # fmt: skip
+    """Write the candidates within reach of particle i to the columns of `pairs`; return how many.
+
+    The arrays div_v, curl_v and energy_shift are None if their rows are not needed.
+    """
+    D = len(dim)
+    n = 0
+    for k in range(0, nc, width(lanes)):
+        r_ij = minus(x_i, load_spatial(lanes, dim, near, 0, k))
+        squared = dot(r_ij, r_ij)
+        inside = squared < reach * reach
+        chosen = front(lanes, inside)
+        store(pairs, (R, n), pick(squared, chosen))
+        store(pairs, (WEIGHT, n), pick(load(lanes, near, (D, k)), chosen))
+        if div_v is not None:
+            v_ij = minus(v_i, load_spatial(lanes, dim, near, D + 1, k))
+            store(pairs, (V_DOT_R, n), pick(dot(v_ij, r_ij), chosen))
+            if curl_v is not None:
+                store_spatial(pairs, CURL, n, pick_spatial(cross(v_ij, r_ij), chosen))
+        if energy_shift is not None:
+            store(pairs, (MU, n), pick(load(lanes, near, (mu_row, k)), chosen))
+        n += count(inside)
+    store(pairs, (R, n), filled(lanes, FAR))
+    for row in range(1, CURL + 3):
+        store(pairs, (row, n), filled(lanes, 0.0))
+    for k in range(0, n, width(lanes)):
+        squared = load(lanes, pairs, (R, k)) + TINY
+        store(pairs, (R, k), squared * inverse_sqrt(squared))
+    return n
+
+
+@njit(**INLINED)
+def _energy_density(lanes, kernel, dim, pairs, n, H_inv):
+    """Return E = sum m_j u_j W_ij(H_i) and H/D dE/dH (by eq 10)."""
+    sum_w = filled(lanes, 0.0)
+    sum_dw = filled(lanes, 0.0)
+    for k in range(0, n, width(lanes)):
+        q = load(lanes, pairs, (R, k)) * H_inv
+        mu = load(lanes, pairs, (MU, k))
+        sum_w += mu * w(kernel, dim, q)
+        sum_dw += mu * (q * q) * dw_over_q(kernel, dim, q)
+    scale = normalisation(kernel, dim) * H_inv ** len(dim)
+    E = scale * lane_sum(sum_w)
+    return E, -(E + scale * lane_sum(sum_dw) / len(dim))
+
+
+@njit(**INLINED)
+def _motion(lanes, kernel, dim, pairs, n, H_inv, curl_v):
+    """Return Omega n div v and Omega n |curl v| (eqs 16-17); curl_v is None without the curl.
+
+    The sign in eq 16 is a misprint: v_ij = v_i - v_j.
+    """
+    D = len(dim)
+    total = filled(lanes, 0.0)
+    curls = zeros(lanes, curl_dim(dim))
+    for k in range(0, n, width(lanes)):
+        q = load(lanes, pairs, (R, k)) * H_inv
+        m_dw = load(lanes, pairs, (WEIGHT, k)) * dw_over_q(kernel, dim, q)
+        total += m_dw * load(lanes, pairs, (V_DOT_R, k))
+        if curl_v is not None:
+            curls = plus(curls, times(load_spatial(lanes, curl_dim(dim), pairs, CURL, k), m_dw))
+    scale = normalisation(kernel, dim) * H_inv ** (D + 2)
+    curl = lane_sums(curls)
+    return -scale * lane_sum(total), scale * np.sqrt(dot(curl, curl))

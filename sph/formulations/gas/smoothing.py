@@ -1,19 +1,24 @@
 """Support radius H and density of a particle from its neighbours (step 2).
 
-Both methods use the distances r[:nc] and weights m[:nc] (by default masses, see `weighting`) of the
-candidates of a particle. They return (H, sum of weights, Omega, wanted); with masses as weights the
-sum is the density rho. The candidates are complete up to the radius `reach`. If H exceeds `reach`,
-`wanted` is the radius that the lists must reach before the next attempt; otherwise it is 0.0. If
-there is no root up to `largest`, H is `largest` and Omega is 1, because H does not depend on the
-density.
+Both methods use the distances and weights (by default masses, see `weighting`) of the n candidates
+of a particle, which are rows of the array `pairs`, in any units. They return (H, sum of weights, Omega, wanted); with masses
+as weights the sum is the density rho. The candidates are complete up to the radius `reach`. If H
+exceeds `reach`, `wanted` is the radius that the candidates must reach before the next attempt;
+otherwise it is 0.0. If there is no root up to `largest`, H is `largest` and Omega is 1, because H
+does not depend on the density.
 """
 
 from typing import NamedTuple
 
+import numpy as np
 from numba import njit
 
-from sph.compiled import INLINED, verb
+from sph.compiled import INLINED
 from sph.kernels import dw_over_q, normalisation, w
+from sph.simd import filled, inverse_cbrt, lane_sum, load, width
+
+# Rows of `pairs`.
+R, WEIGHT = 0, 1
 
 # Each pass of eqs 7 and 15 multiplies the distance from their common root by 1 - Omega. In resolved
 # flow the passes converge to within one per cent. They diverge if Omega exceeds 2, at jumps of mass
@@ -26,58 +31,76 @@ UNSETTLED = 0.05
 MAX_ITERATIONS = 100
 
 
-@verb
-def find_support(self, kernel, dim, r, m, nc, mass, H, ratio, reach, largest):
-    return self.find_support(kernel, dim, r, m, nc, mass, H, ratio, reach, largest)
+class Smoothing(NamedTuple):
+    """Evaluate eqs 7, 8 and 15 `passes` times; solve them if the last change of H is large.
 
+    passes = 0: solve them always. tolerance: of the solution, relative.
+    """
 
-class FixedPasses(NamedTuple):
-    """Evaluate eqs 7, 8 and 15 `count` times; solve them if the last change of H is large."""
-
-    count: int  # type: ignore[assignment]
-    tolerance: float  # of the solution, relative
-    unsettled: float = UNSETTLED
-
-    def find_support(self, kernel, dim, r, m, nc, mass, H, ratio, reach, largest):
-        C = normalisation(kernel, dim)
-        D = len(dim)
-        rho = 0.0
-        Omega = 0.0
-        for index in range(self.count):
-            if not reach >= H:
-                return H, rho, Omega, H
-            H_inv = 1.0 / H
-            sum_w = 0.0
-            if index < self.count - 1:
-                for k in range(nc):
-                    sum_w += m[k] * w(kernel, dim, r[k] * H_inv)
-            else:
-                sum_dw = 0.0
-                for k in range(nc):
-                    q = r[k] * H_inv
-                    sum_w += m[k] * w(kernel, dim, q)
-                    sum_dw += m[k] * (q * q) * dw_over_q(kernel, dim, q)
-                Omega = -sum_dw / (D * sum_w)  # eq 8 with eqs 7 and 10: the D w terms cancel the 1
-            rho = C * H_inv**D * sum_w  # eq 7
-            H = min(ratio * (mass / rho) ** (1.0 / D), largest)  # eq 15
-        if abs(H * H_inv - 1.0) > self.unsettled or not largest > H:
-            return solve(
-                kernel, dim, r, m, nc, mass, 1.0 / H_inv, ratio, reach, largest, self.tolerance
-            )
-        return H, rho, Omega, (0.0 if reach >= H else H)
-
-
-class Converged(NamedTuple):
-    """Solve eqs 7 and 15 together to the relative `tolerance`."""
-
+    passes: int
     tolerance: float
-
-    def find_support(self, kernel, dim, r, m, nc, mass, H, ratio, reach, largest):
-        return solve(kernel, dim, r, m, nc, mass, H, ratio, reach, largest, self.tolerance)
+    unsettled: float = UNSETTLED
 
 
 @njit(**INLINED)
-def solve(kernel, dim, r, m, nc, mass, H, ratio, reach, largest, tolerance):
+def _per_spacing(dim, number):
+    """Return number^(1/D), the inverse of the spacing, for a number of particles per volume."""
+    if len(dim) == 3:
+        root = inverse_cbrt(number)
+        return number * (root * root)
+    return number if len(dim) == 1 else np.sqrt(number)
+
+
+@njit(**INLINED)
+def _sums(lanes, kernel, dim, pairs, n, H_inv):
+    """Return the sums of m w(q) and m q^2 (dw/dq)/q over candidates."""
+    sum_w = filled(lanes, 0.0)
+    sum_dw = filled(lanes, 0.0)
+    for k in range(0, n, width(lanes)):
+        q = load(lanes, pairs, (R, k)) * H_inv
+        m_k = load(lanes, pairs, (WEIGHT, k))
+        sum_w += m_k * w(kernel, dim, q)
+        sum_dw += m_k * (q * q) * dw_over_q(kernel, dim, q)
+    return lane_sum(sum_w), lane_sum(sum_dw)
+
+
+@njit(**INLINED)
+def find_support(smoothing, lanes, kernel, dim, pairs, n, mass, H, ratio, reach, largest):
+    """Return (H, sum of weights, Omega, wanted) by the method of `smoothing`."""
+    C = normalisation(kernel, dim)
+    D = len(dim)
+    rho = 0.0
+    Omega = 0.0
+    # in terms of 1/H, so that no division delays the next pass
+    H_inv = before = 1.0 / H
+    mass_inv, ratio_inv, largest_inv = 1.0 / mass, 1.0 / ratio, 1.0 / largest
+    for index in range(smoothing.passes):
+        if not reach * H_inv >= 1.0:
+            return 1.0 / H_inv, rho, Omega, 1.0 / H_inv
+        if index < smoothing.passes - 1:
+            total = filled(lanes, 0.0)
+            for k in range(0, n, width(lanes)):
+                m, r = load(lanes, pairs, (WEIGHT, k)), load(lanes, pairs, (R, k))
+                total += m * w(kernel, dim, r * H_inv)
+            sum_w = lane_sum(total)
+        else:
+            sum_w, sum_dw = _sums(lanes, kernel, dim, pairs, n, H_inv)
+            Omega = -sum_dw / (D * sum_w)  # eq 8 with eqs 7 and 10: the D w terms cancel the 1
+        rho = C * H_inv**D * sum_w  # eq 7
+        before = H_inv
+        H_inv = max(_per_spacing(dim, rho * mass_inv) * ratio_inv, largest_inv)  # eq 15
+    if smoothing.passes > 0 and abs(before - H_inv) <= smoothing.unsettled * H_inv:
+        if H_inv > largest_inv:
+            H = 1.0 / H_inv
+            return H, rho, Omega, (0.0 if reach >= H else H)
+    return _solve(
+        lanes, kernel, dim, pairs, n, mass, 1.0 / before, ratio, reach, largest,
+        smoothing.tolerance,
+    )  # fmt: skip
+
+
+@njit(**INLINED)
+def _solve(lanes, kernel, dim, pairs, n, mass, H, ratio, reach, largest, tolerance):
     """Return the root of eqs 7 and 15 by Newton's iteration, safeguarded by bisection."""
     C = normalisation(kernel, dim)
     D = len(dim)
@@ -88,12 +111,7 @@ def solve(kernel, dim, r, m, nc, mass, H, ratio, reach, largest, tolerance):
         if not reach >= H:
             return H, 0.0, 0.0, H
         H_inv = 1.0 / H
-        sum_w = 0.0
-        sum_dw = 0.0
-        for k in range(nc):
-            q = r[k] * H_inv
-            sum_w += m[k] * w(kernel, dim, q)
-            sum_dw += m[k] * (q * q) * dw_over_q(kernel, dim, q)
+        sum_w, sum_dw = _sums(lanes, kernel, dim, pairs, n, H_inv)
         if sum_w < target:  # sum m w(r/H) rises with H
             lower = H
             if not largest > H:

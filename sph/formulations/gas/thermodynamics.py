@@ -1,7 +1,7 @@
-"""Quantities of one particle from density and energy: EOS, Balsara factor, rate of alpha.
+"""Quantities of the particles of a block from density and energy: EOS, Balsara factor, rate of alpha.
 
-The density pass calls these functions for each particle after its sums; the pair loops of the rate
-pass use only their results. Arrays are (N,), i is the particle.
+The density pass calls these functions after its sums; the pair loops of the rate pass use only
+their results. Arrays are (N,).
 """
 
 from numba import njit
@@ -12,45 +12,52 @@ from sph.eos import sound_speed as sound_speed_of
 from sph.formulations.gas.schemes import summed_terms
 from sph.formulations.gas.terms import alpha_rate as alpha_rate_of
 from sph.formulations.gas.terms import balsara_factor
-
-
-# A function that is called from compiled code takes over `fastmath` unless it sets its own. Here
-# fastmath is off, so that the order of the products never depends on the calling function.
-@njit(nogil=True, error_model="numpy", fastmath=False, forceinline=True)
-def _over(P, Omega, rho):
-    return P / (Omega * rho * rho)
+from sph.neighbours.order import BLOCK
+from sph.passes.gather import read, write
+from sph.simd import block_width
 
 
 @njit(**INLINED)
-def equation_of_state(i, models, rho, Omega, energy, pressure, pressure_term, sound_speed):
-    """Set pressure, P/(Omega rho^2) and sound speed, and return the sound speed.
+def thermodynamics(
+    lanes, models, block, energy, support, rho, Omega, div_v, curl_v, alpha, energy_shift, pressure,
+    pressure_term, sound_speed, balsara, alpha_rate,
+):  # fmt: skip
+    """Set sound speed, pressure, P/(Omega rho^2), Balsara factor and rate of alpha of a block.
 
-    pressure may be None.
+    That is, those of them that the scene has: an array may be None. A scheme that sums its pressure
+    (energy_shift is not None) sets pressure and P/(Omega rho^2) itself, by `summed`.
     """
-    P = pressure_of(models.eos, rho, energy[i])
-    c = sound_speed_of(models.eos, rho, P)
-    pressure_term[i] = _over(P, Omega, rho)
-    sound_speed[i] = c
-    if pressure is not None:
-        pressure[i] = P
-    return c
+    for lane in range(0, BLOCK, block_width(lanes)):
+        rho_i = read(lanes, rho, block, lane, 1.0)
+        P = pressure_of(models.eos, rho_i, read(lanes, energy, block, lane, 1.0))
+        c = sound_speed_of(models.eos, rho_i, P)
+        write(sound_speed, block, lane, c)
+        if energy_shift is None:
+            Omega_i = read(lanes, Omega, block, lane, 1.0)
+            write(pressure_term, block, lane, P / (Omega_i * rho_i * rho_i))
+            if pressure is not None:
+                write(pressure, block, lane, P)
+        if div_v is not None:  # eqs 21, 27-28
+            H = read(lanes, support, block, lane, 1.0)
+            div = read(lanes, div_v, block, lane, 0.0)
+            if balsara is not None:
+                curl = 0.0 * div
+                if curl_v is not None:
+                    curl = read(lanes, curl_v, block, lane, 0.0)
+                write(balsara, block, lane, balsara_factor(models.balsara, div, curl, c, H))
+            if alpha is not None:
+                alpha_i = read(lanes, alpha, block, lane, 0.0)
+                h = H / models.support_ratio
+                rate = alpha_rate_of(models.viscosity, alpha_i, h, c, div)
+                write(alpha_rate, block, lane, rate)
 
 
 @njit(**INLINED)
 def summed(i, models, energy, energy_density, slope, pressure, pressure_term, energy_shift):
-    """Set the pressure terms of a scheme that sums its pressure.
+    """Set the pressure terms of particle i in a scheme that sums its pressure.
 
     energy_density: the sum of m_j u_j W_ij; slope: see `sph.formulations.gas.schemes`.
     """
     pressure[i], pressure_term[i], energy_shift[i] = summed_terms(
         models.scheme, models.eos, energy[i], energy_density, slope
     )
-
-
-@njit(**INLINED)
-def dissipation(i, models, H, c, div, curl, alpha, balsara, alpha_rate):
-    """Set Balsara's factor (eq 21) and the rate of alpha (eqs 27-28), if the scene has them."""
-    if balsara is not None:
-        balsara[i] = balsara_factor(models.balsara, div, curl, c, H)
-    if alpha is not None:
-        alpha_rate[i] = alpha_rate_of(models.viscosity, alpha[i], H / models.support_ratio, c, div)

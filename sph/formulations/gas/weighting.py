@@ -33,7 +33,12 @@ A weighting is a NamedTuple with the methods
 
 from typing import NamedTuple
 
-from sph.compiled import verb
+from numba import njit
+
+from sph.compiled import INLINED, verb
+from sph.neighbours.order import BLOCK
+from sph.passes.gather import read
+from sph.simd import block_width, select, store
 
 
 @verb
@@ -49,6 +54,14 @@ def mass_per_weight(self, mass):
 @verb
 def by_share(self, of_i, of_j, mass_i, mass_j):
     return self.by_share(of_i, of_j, mass_i, mass_j)
+
+
+@njit(**INLINED)
+def copy_weights(lanes, copied, begin, weighting, mass, block, factor):
+    """Copy the weights of a block to `copied`, times factor."""
+    for lane in range(0, BLOCK, block_width(lanes)):
+        m = read(lanes, mass, block, lane, 0.0)  # 0 outside the array
+        store(copied, begin + lane, select(m > 0.0, weight(weighting, m) * factor, 0.0))
 
 
 class ByMass(NamedTuple):

@@ -18,11 +18,11 @@ class Lucy(NamedTuple):
         return 5 / math.pi if len(dim) == 2 else 105 / (16 * math.pi)
 
     def w(self, dim, q):
-        u = larger(1.0 - q, 0.0 * q)
+        u = larger(1.0 - q, 0.0)
         return (1.0 + 3.0 * q) * u * u * u
 
     def dw_over_q(self, dim, q):
-        u = larger(1.0 - q, 0.0 * q)
+        u = larger(1.0 - q, 0.0)
         return -12.0 * u * u
 
     force_over_q = dw_over_q
