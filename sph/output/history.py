@@ -81,10 +81,6 @@ class History:
         write_text(Path(path), _as_text([names, *kept]))
         return cls(Path(path), names)
 
-    def append(self, row: Mapping[str, object]) -> None:
-        """Add the row of a step. Raises KeyError if the value of a column is missing."""
-        self.extend({name: [value] for name, value in row.items()})
-
     def extend(self, columns: Mapping[str, Sequence[object]]) -> None:
         """Add rows of steps, by column. Raises KeyError if a column is missing."""
         texts = [map(str, columns[name]) for name in self.columns]

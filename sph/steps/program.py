@@ -51,7 +51,7 @@ class Program:
         self._table = Table()
         self._ends: list[tuple[int, bool, int]] = []  # of each call: action, swaps, phase
         neighbours = simulation.neighbours()
-        self._kinds = _kinds_of(neighbours)
+        self._kinds = self._present_kinds()
         self._held = self._present()
         self.momentum = np.empty(simulation.scene.dimension)
         self._dt = Held("dt", 0.0)
@@ -73,7 +73,7 @@ class Program:
 
     def fits(self) -> bool:
         """Whether the present lists have the types of those that the calls were made for."""
-        return _kinds_of(self._simulation.neighbours()) == self._kinds
+        return self._present_kinds() == self._kinds
 
     def refresh(self, has_new_lists: bool) -> None:
         """Make the words hold the present arrays."""
@@ -94,6 +94,11 @@ class Program:
         first, second = SWAPPED
         held = self._held
         held[first], held[second] = held[second], held[first]
+
+    def _present_kinds(self) -> list[tuple[np.dtype, bool]]:
+        s = self._simulation
+        arrays = _arrays_in((s.neighbours(), s.search.origin))
+        return [(one.dtype, one.flags.c_contiguous) for one in arrays]
 
     def _present(self) -> dict[str, np.ndarray]:
         """Return the arrays that steps replace, by name."""
@@ -178,10 +183,6 @@ class Program:
         )  # fmt: skip
         if self._fences.size:
             self._add(driver.FENCES, driver.fenced, *of("position"), self._fences)
-
-
-def _kinds_of(entries: tuple) -> list[np.dtype]:
-    return [one.dtype for one in _arrays_in(entries)]
 
 
 def _arrays_in(entries: tuple) -> Iterator[np.ndarray]:

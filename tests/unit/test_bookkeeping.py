@@ -6,6 +6,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from columns import as_columns
 
 from sph import config as configuration
 from sph import restarting, runner
@@ -82,7 +83,7 @@ def session(tmp_path, simulation):
         history = History.create(directory.history, 2, [*extra, "mode_amplitude"])
         start = OF_EVERY_RUN | {"wall_seconds": 1.0, "cpu_seconds": 1.5, "mode_amplitude": 0.0}
         for row in past:
-            history.append(start | row)
+            history.extend(as_columns(start | row))
         history.flush()
         progress = SimpleNamespace(notes=[], closed=0)
         one = Runner(CONFIG, directory, simulation, history, progress, [])
@@ -189,7 +190,7 @@ def place(tmp_path):
         history = History.create(directory.history, 2, [*extra])
         for row in rows:
             start = OF_EVERY_RUN | {"wall_seconds": 1.0, "cpu_seconds": 1.5}
-            history.append(start | row)
+            history.extend(as_columns(start | row))
         history.close()
         return directory
 

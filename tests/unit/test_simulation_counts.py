@@ -68,7 +68,7 @@ def hollow(monkeypatch):
         one = Simulation.of_problem(Scene(config), 1, clock)
         one.asked = []  # the blocks that ask for wider lists, one entry a pass over the density
 
-        def run(function, *_):
+        def run(function, *_, **__):
             called.setdefault(function, set()).add(clock.now)
             if function is density:
                 one.sweep.wanted[:] = 0.0
@@ -80,6 +80,7 @@ def hollow(monkeypatch):
                              ("build", None), ("stale", True), ("widen", None)):  # fmt: skip
             replace(one.search, name, result)
         one.search.origin = Origin(one.particles.position, np.ones(n), 0.1)
+        one.search.lists = SimpleNamespace(count=np.ones(1))
         for name, result in (("keep", None), ("predict", 5.0), ("correct", 7.0)):
             replace(leapfrog, name, result)
         for name in ("limit", "before_contact"):

@@ -2,6 +2,7 @@ import timeit
 
 import numpy as np
 import pytest
+from columns import as_columns
 
 from sph.errors import FileError
 from sph.output.history import History, columns, read
@@ -24,7 +25,7 @@ def history(tmp_path):
 
 def append(history, steps):
     for step in steps:
-        history.append(row(history, step))
+        history.extend(as_columns(row(history, step)))
 
 
 def test_columns_by_dimension():
@@ -52,7 +53,7 @@ def test_numbers_read_back_bit_for_bit(history):
 
 def test_non_finite_numbers_and_text_with_comma_read_back(history):
     values = {"t": np.nan, "dt": np.float64("inf"), "limiter": 'energy, "cold"'}
-    history.append(row(history, 0) | values)
+    history.extend(as_columns(row(history, 0) | values))
     history.flush()
     found = read(history.path)
     assert np.isnan(found["t"][0])
@@ -78,7 +79,7 @@ def test_append_row_missing_column_is_refused(history):
     incomplete = row(history, 0)
     del incomplete["mode_amplitude"]
     with pytest.raises(KeyError, match="mode_amplitude"):
-        history.append(incomplete)
+        history.extend(as_columns(incomplete))
 
 
 def test_resume_keeps_rows_up_to_step_and_appends(history):
@@ -132,9 +133,22 @@ def test_create_in_unwritable_directory_is_refused(messages, tmp_path):
         History.create(tmp_path / "run" / "history.csv", 1)
 
 
+def test_rows_at_once_are_written_as_one_after_another(history):
+    rows = [row(history, step) | {"limiter": f"no, {step}"} for step in range(3)]
+    for one in rows:
+        history.extend(as_columns(one))
+    history.flush()
+    header, *lines = history.path.read_text().splitlines()
+    history.extend({name: [one[name] for one in rows] for name in rows[0]})
+    history.flush()
+    assert history.path.read_text().splitlines() == [header, *lines, *lines]
+
+
 def test_append_row_costs_little(history):
     numbers = row(history, 0)
-    seconds = min(timeit.repeat(lambda: history.append(numbers), number=200, repeat=20)) / 200
+    seconds = (
+        min(timeit.repeat(lambda: history.extend(as_columns(numbers)), number=200, repeat=20)) / 200
+    )
     # measured: 10 microseconds; a step of the smallest runs is of some hundred, and a machine
     # may be three times slower
     assert seconds < 30e-6

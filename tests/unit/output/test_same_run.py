@@ -5,6 +5,7 @@ import dataclasses
 import h5py
 import numpy as np
 import pytest
+from columns import as_columns
 
 from sph.errors import FileError
 from sph.output import checkpoint, files
@@ -40,7 +41,7 @@ def run(tmp_path, state):
     run.write_config(state.config.to_toml())
     history = History.create(run.history, 1, state.config.problem.diagnostics(state.particles))
     for step in range(7):
-        history.append(row(at_step(state, step)))
+        history.extend(as_columns(row(at_step(state, step))))
         if step % 2 == 0:
             checkpoint.write(run.checkpoint_path(step // 2), at_step(state, step))
     history.close()

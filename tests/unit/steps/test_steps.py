@@ -29,6 +29,7 @@ SCENES = {
     "summed pressure": ("physics.scheme=pressure_energy", "physics.conductivity=approach"),
     "limited supports": OPEN,
     "no divergence": ("physics.balsara=false",),
+    "single precision": ("run.precision=single",),
     "field": (FIELD, RANGE),
     "heating": (HEATING,),
 }

@@ -4,6 +4,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from columns import as_columns
 from states import gas_state
 
 from sph.analysis.report.runs import Row
@@ -144,7 +145,7 @@ def ended(tmp_path):
     history = History.create(tmp_path / "history.csv", 1)
     for step in range(4):
         row = dict.fromkeys(history.columns, 0.0) | {"step": step}
-        history.append(row | {name: values[step] for name, values in HISTORY.items()})
+        history.extend(as_columns(row | {name: values[step] for name, values in HISTORY.items()}))
     history.close()
     warned = [{"kind": "paired"}, {"kind": "limit"}, {"kind": "limit"}]
     summary = {
