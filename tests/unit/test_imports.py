@@ -82,7 +82,7 @@ print(sorted((compilers | {"scipy.spatial", "matplotlib"}) & set(sys.modules)))
 @pytest.mark.slow
 def test_run_of_compiled_scene_imports_nothing_that_compiles(tmp_path):
     (tmp_path / "tube.toml").write_text(
-        '[problem]\nname = "shock_tube"\nn = 50\n[time]\nend = 0.01\n[output]\ninterval = 0.01\n'
+        '[problem]\nname = "shock_tube"\nn = 50\n[time]\nend = 0.1\n[output]\ninterval = 0.1\n'
     )
     for _ in range(2):  # the first run compiles, unless another test has
         done = subprocess.run(
