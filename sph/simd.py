@@ -220,9 +220,7 @@ for _name, _functions in (
                 builder, name, kind, a.type, (a, b), FASTEST
             ),
         )
-_of_two(
-    operator.pow, lambda builder, kind, a, b: _call(builder, "llvm.pow", kind, a.type, (a, b))
-)
+_of_two(operator.pow, lambda builder, kind, a, b: _call(builder, "llvm.pow", kind, a.type, (a, b)))
 for _name, _functions in (
     ("llvm.fabs", (abs, np.abs)),
     ("llvm.sqrt", (np.sqrt, math.sqrt)),
@@ -263,8 +261,7 @@ def _place(context, builder, array_type, array, index_type, index):
     else:
         parts, kinds = [index], [index_type]
     parts = [
-        context.cast(builder, one, kind, types.intp)
-        for one, kind in zip(parts, kinds, strict=True)
+        context.cast(builder, one, kind, types.intp) for one, kind in zip(parts, kinds, strict=True)
     ]
     view = context.make_array(array_type)(context, builder, array)
     return cgutils.get_item_pointer(context, builder, array_type, view, parts, wraparound=False)
@@ -514,9 +511,7 @@ def lane_max(typing_context, x):
         base = kind
         if isinstance(kind, Vec):
             base = kind.kind
-            value = _call(
-                builder, "llvm.vector.reduce.fmax", kind, _KINDS[base], (value,), FASTEST
-            )
+            value = _call(builder, "llvm.vector.reduce.fmax", kind, _KINDS[base], (value,), FASTEST)
         return context.cast(builder, value, base, types.float64)
 
     return types.float64(x), generate

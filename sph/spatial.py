@@ -18,8 +18,7 @@ def _parts(context, builder, kind, value, wanted):
     kinds = list(kind)
     if isinstance(wanted, Vec):
         return [
-            _as(context, builder, one, each, wanted)
-            for one, each in zip(found, kinds, strict=True)
+            _as(context, builder, one, each, wanted) for one, each in zip(found, kinds, strict=True)
         ]
     return [
         context.cast(builder, one, each, wanted) for one, each in zip(found, kinds, strict=True)

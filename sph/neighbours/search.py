@@ -118,9 +118,7 @@ class Search:
         origin = self.origin
         if self.lists is None or origin is None:
             return True
-        moved, grown = _motion(
-            position, support, origin.position, origin.support, self.boxes
-        )
+        moved, grown = _motion(position, support, origin.position, origin.support, self.boxes)
         self.reach_factor = 1.0 + origin.skin - 2.0 * moved
         return not self.reach_factor > grown
 

@@ -130,14 +130,25 @@ def shocks(
             to = t * len(fields) * BLOCK
             place_block(lanes, dim, copied, to, position, block, neighbours, image, x_0, per_length)
             copy_vectors(
-                lanes, dim, copied, to + D * BLOCK, velocity, block, neighbours, image, v_0, per_velocity
+                lanes,
+                dim,
+                copied,
+                to + D * BLOCK,
+                velocity,
+                block,
+                neighbours,
+                image,
+                v_0,
+                per_velocity,
             )
             copy_vectors(
                 lanes, dim, copied, to + 2 * D * BLOCK, acceleration, block, neighbours, image, a_0,
                 per_acceleration,
             )  # fmt: skip
             copy_weights(lanes, copied, to + m_row * BLOCK, weighting, mass, block, per_mass)
-            _copy_signs(lanes, copied, to + signed_row * BLOCK, weighting, mass, div_v, block, per_mass)
+            _copy_signs(
+                lanes, copied, to + signed_row * BLOCK, weighting, mass, div_v, block, per_mass
+            )
             copy_values(lanes, copied, to + c_row * BLOCK, sound_speed, block, 0.5 * per_velocity)
         for block in range(begin, end):
             low, high = own_box(dim, neighbours, block, x_0, per_length)
