@@ -1,6 +1,6 @@
 """Management of the candidate lists: when to rebuild them, and with which skin."""
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numba import njit
@@ -103,7 +103,6 @@ class Search:
         self.images: Images | None = None  # of the domain, which the lists refer to
         self.boxes: np.ndarray | None = None  # (blocks, 2 D) of the present positions
         self._builder: lists.Builder | None = None
-        self._tree: tree.Tree | None = None
         self._room: np.ndarray | None = None  # that each chunk of the lists needed
         self.reach_factor = 0.0  # candidates are complete within this factor of the list support
         self._widenings = 0  # in this step
@@ -146,9 +145,10 @@ class Search:
     def build(self, origin: Origin, identity: np.ndarray) -> None:
         """Build the lists from `origin`, whose arrays are in block order and must not change."""
         self._check_reach(origin, identity)
+        assert self.images is not None
         self.lists = None  # frees the old lists before the new ones are built
-        self._tree = tree.build(origin.position, origin.support)
-        self._builder = lists.Builder(self._tree, origin.skin, self.images, self.team)
+        boxes = tree.build(origin.position, origin.support)
+        self._builder = lists.Builder(boxes, origin.skin, self.images, self.team)
         self.lists, self._room = self._builder.all(self._room)
         self.boxes = self._builder.boxes()
         self.origin = origin
@@ -167,7 +167,9 @@ class Search:
 
         Lists of other superblocks change only if the larger supports reach them.
         """
-        assert self.origin is not None and self.lists is not None  # lists have been built
+        builder: Any = self._builder  # lists have been built
+        assert self.origin is not None
+        assert self.lists is not None
         self._widenings += 1
         asked = wanted > 1.0
         factor = np.where(asked, wanted * (2.0 if self._widenings > PATIENCE else 1.0), 1.0)
@@ -182,7 +184,7 @@ class Search:
             self.reach_factor, self.boxes = reach_factor, boxes
             return
         self.origin = origin
-        tree.raise_support(self._tree, self._builder.leaves, asked, support)
-        self.lists = self._builder.again(self.lists, own)
+        tree.raise_support(builder.tree, builder.leaves, asked, support)
+        self.lists = builder.again(self.lists, own)
         reached = lists.listed(self.lists, own)
-        self.lists = self._builder.again(self.lists, reached & ~own)
+        self.lists = builder.again(self.lists, reached & ~own)
