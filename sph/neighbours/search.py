@@ -38,15 +38,15 @@ class Origin(NamedTuple):
 
 
 @njit(**COMPILED)
-def _motion(position, support, list_position, list_support, boxes):
-    """Return the largest |r - r_list| / H_list and the largest H / H_list.
+def motion(first, last, position, support, list_position, list_support, boxes):
+    """Return the largest |r - r_list| / H_list and the largest H / H_list of blocks [first, last).
 
     boxes (blocks, 2 D) receives the lower and upper corners of the box of each block.
     """
     D, n = position.shape
     moved = 0.0
     grown = 0.0
-    for block in range(boxes.shape[0]):
+    for block in range(first, last):
         a, b = block * BLOCK, min((block + 1) * BLOCK, n)
         for d in range(D):
             low = high = position[d, a]
@@ -64,11 +64,11 @@ def _motion(position, support, list_position, list_support, boxes):
 
 
 @njit(**COMPILED)
-def _largest_step(velocity, support, dt):
-    """Return the largest |v| dt / H."""
-    D, n = velocity.shape
+def _largest_step(first, last, velocity, support, dt):
+    """Return the largest |v| dt / H of particles [first, last)."""
+    D = velocity.shape[0]
     largest = 0.0
-    for i in range(n):
+    for i in range(first, last):
         squared = 0.0
         for d in range(D):
             squared += velocity[d, i] ** 2
@@ -117,13 +117,18 @@ class Search:
         origin = self.origin
         if self.lists is None or origin is None:
             return True
-        moved, grown = _motion(position, support, origin.position, origin.support, self.boxes)
+        found = self.team.chunks(
+            motion, self.lists.first[-1], position, support, origin.position, origin.support,
+            self.boxes,
+        )  # fmt: skip
+        moved, grown = map(max, zip(*found, strict=True))
         self.reach_factor = 1.0 + origin.skin - 2.0 * moved
         return not self.reach_factor > grown
 
     def skin_for(self, velocity: np.ndarray, support: np.ndarray, dt: float) -> float:
         """Return the skin for lists built now, for velocity (D, N), support (N,) and step dt."""
-        return best_skin(_largest_step(velocity, support, dt), velocity.shape[0])
+        steps = self.team.chunks(_largest_step, support.size, velocity, support, dt)
+        return best_skin(max(steps), velocity.shape[0])
 
     def guess(self, position: np.ndarray, ratio: float) -> np.ndarray:
         """Supports (N,) to begin with, none so wide that lists cannot serve it."""
