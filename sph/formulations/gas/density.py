@@ -203,8 +203,9 @@ def _select(
     for row in range(1, CURL + 3):
         store(pairs, (row, n), filled(lanes, 0.0))
     for k in range(0, n, width(lanes)):
-        squared = load(lanes, pairs, (R, k)) + TINY
-        store(pairs, (R, k), squared * inverse_sqrt(squared))
+        squared = load(lanes, pairs, (R, k))
+        # 0 for particles in one place, which no support radius separates
+        store(pairs, (R, k), squared * inverse_sqrt(squared + TINY))
     return n
 
 
