@@ -61,7 +61,7 @@ class Run(Section):
         "double",
         description='precision of the sums over neighbours: "single" takes less time and changes '
         "results by about 1e-6. The state, and sums over all particles, are in double precision",
-        json_schema_extra=RECORDED,
+        json_schema_extra=RECORDED,  # type: ignore[arg-type]
     )
 
 

@@ -31,17 +31,25 @@ from sph.passes.gather import (
 )
 from sph.simd import (
     any_lane,
+    at,
     block_width,
+    dot,
     filled,
     inverse_sqrt,
     lane_max,
     lane_sum,
+    lane_sums,
     load,
+    load_spatial,
+    minus,
+    plus,
+    put,
     select,
     store,
+    times,
     width,
+    zeros,
 )
-from sph.spatial import at, dot, lane_sums, load_spatial, minus, plus, put, times, zeros
 
 # Quantities of candidates after position and velocity.
 RHO, P_TERM, C_S, H_INV, M_HALF, M_GRADIENT, NEXT = 0, 1, 2, 3, 4, 5, 6
@@ -213,7 +221,7 @@ def _pressure_terms(
 
 @njit(**INLINED)
 def _within(lanes, dim, near, nc, h_row, x_i, H_inv_i, used):
-    """Write to `used` the columns at which a group of lanes with a neighbour begins; return how many.
+    """Write to `used` where groups of lanes with a neighbour begin; return their number.
 
     Candidates are in the order of space, so that a third of the groups has no neighbour.
     """

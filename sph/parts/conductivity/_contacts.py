@@ -26,17 +26,21 @@ from sph.passes.gather import (
     unpacked,
 )
 from sph.simd import (
+    at,
     block_width,
+    dot,
     filled,
     inverse_sqrt,
     lane_max,
     lane_sum,
     load,
+    load_spatial,
+    minus,
     select,
     store,
+    times,
     width,
 )
-from sph.spatial import at, dot, load_spatial, minus, times
 
 COLD = 1e-300  # gives 0 instead of 0/0 in uniform cold gas
 

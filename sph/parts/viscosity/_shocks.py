@@ -32,21 +32,26 @@ from sph.passes.gather import (
     unpacked,
 )
 from sph.simd import (
+    at,
     block_width,
     count,
+    dot,
     filled,
     front,
     inverse_sqrt,
     lane_max,
     lane_sum,
     load,
-    pick,
+    load_spatial,
+    minus,
+    pick_spatial,
     rows,
     select,
     store,
+    store_spatial,
+    times,
     width,
 )
-from sph.spatial import at, dot, load_spatial, minus, pick_spatial, store_spatial, times
 
 # A pivot below this fraction of the trace means that neighbours lie on a line or in a plane. The
 # gradient is then undefined and set to zero.
