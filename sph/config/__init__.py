@@ -35,7 +35,7 @@ class Config:
 
     @functools.cached_property
     def recorded(self) -> str:
-        """The TOML text that checkpoints keep: all keys but those of [run] that change no result."""
+        """The TOML text that checkpoints keep: all keys but RESOURCES, which change no result."""
         tables = _tables(self)
         for key in RESOURCES:
             del tables["run"][key]
