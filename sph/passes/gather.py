@@ -262,6 +262,8 @@ def near_blocks(lanes, dim, boxes, number, low, high, reach, chosen):
         near = dot(gap, gap) < farthest * farthest
         store(chosen, m, pick(numbers_from(lanes, t), front(lanes, near)))
         m += count(near)
+    while m > 0 and chosen[m - 1] >= number:  # a reach beyond FAR chooses lanes beyond the list
+        m -= 1
     return m
 
 

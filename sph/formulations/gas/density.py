@@ -206,7 +206,8 @@ def _select(
         store(pairs, (row, n), filled(lanes, 0.0))
     for k in range(0, n, width(lanes)):
         squared = load(lanes, pairs, (R, k))
-        store(pairs, (R, k), squared * inverse_sqrt(squared + TINY))  # 0 for coincident particles
+        # 0 for particles in one place, which no support radius separates
+        store(pairs, (R, k), squared * inverse_sqrt(squared + TINY))
     return n
 
 
