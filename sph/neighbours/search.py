@@ -21,6 +21,9 @@ GROWTH = 0.05
 BUILD_OVER_PASSES = 0.3
 COPYING = 0.12
 
+# Extent of the region of a list in support diameters: a superblock of 128 particles and H around it.
+WIDTH = 1.8
+
 # Share of superblocks above which all lists are built again instead of those that asked.
 MANY = 0.3
 
@@ -80,12 +83,12 @@ def best_skin(step: float, dimension: int) -> float:
     """Return the skin with the lowest cost per step if particles move `step` supports in a step.
 
     Lists that serve k steps need a skin of GROWTH + 2 (k - 1) step. Each step then costs 1/k of a
-    build, and the number of listed blocks grows as (1 + skin)^D.
+    build, and the number of listed blocks grows as (1 + skin/WIDTH)^D.
     """
     least, steps = np.inf, 1
     for k in range(1, 21):
         skin = GROWTH + 2 * (k - 1) * step
-        cost = BUILD_OVER_PASSES / k + COPYING * (1 + skin) ** dimension
+        cost = BUILD_OVER_PASSES / k + COPYING * (1 + skin / WIDTH) ** dimension
         if not cost < least:  # the costs are convex in k
             break
         least, steps = cost, k

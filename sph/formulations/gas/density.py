@@ -90,7 +90,9 @@ def density(
         i_0, i_end = begin * BLOCK, min(end * BLOCK, mass.size)
         x_0, v_0 = at(dim, position, i_0), at(dim, velocity, i_0)
         per_length = unit(largest_of(support_before, i_0, i_end))
-        per_velocity = unit(fastest(dim, velocity, i_0, i_end))
+        # beside fast neighbours, gas at rest must not have the unit of its round-off
+        thermal = np.sqrt(max(0.0, largest_of(energy, i_0, i_end)))
+        per_velocity = unit(max(fastest(dim, velocity, i_0, i_end), thermal))
         per_mass = unit(weight(weighting, largest_of(mass, i_0, i_end)))
         per_energy = per_mass * unit(largest_of(energy, i_0, i_end))
         per_density = per_mass / per_length**D
