@@ -31,6 +31,8 @@ def address(context, builder, array_type, array, index_type, index):
     parts = [
         context.cast(builder, one, kind, types.intp) for one, kind in zip(parts, kinds, strict=True)
     ]
+    if array_type.layout != "C":  # lanes would be read from other elements without any error
+        raise TypeError(f"{array_type}: expected an array in C order")
     view = context.make_array(array_type)(context, builder, array)
     return cgutils.get_item_pointer(context, builder, array_type, view, parts, wraparound=False)
 
