@@ -179,8 +179,10 @@ class Search:
         assert self.origin is not None
         assert self.lists is not None
         self._widenings += 1
-        asked = wanted > 1.0
-        factor = np.where(asked, wanted * (2.0 if self._widenings > PATIENCE else 1.0), 1.0)
+        asked = wanted > 0.0
+        # where particles have moved, lists reach less far than the supports they are built for
+        growth = (2.0 if self._widenings > PATIENCE else 1.0) / min(self.reach_factor, 1.0)
+        factor = np.where(asked, wanted * growth, 1.0)
         support = self.origin.support * np.repeat(factor, BLOCK)[: identity.size]
         origin = self.origin._replace(support=support)
         changed = self._check_reach(origin, identity)
