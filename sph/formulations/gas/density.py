@@ -22,6 +22,7 @@ from sph.passes.gather import (
     fastest,
     largest_of,
     longest_list,
+    middle,
     near_blocks,
     near_particles,
     own_box,
@@ -90,7 +91,7 @@ def density(
         if not wanted[begin:end].any():
             continue
         i_0, i_end = begin * BLOCK, min(end * BLOCK, mass.size)
-        x_0, v_0 = at(dim, position, i_0), at(dim, velocity, i_0)
+        x_0, v_0 = middle(dim, neighbours, begin, end), at(dim, velocity, i_0)
         per_length = unit(largest_of(support_before, i_0, i_end))
         # beside fast neighbours, gas at rest must not have the unit of its round-off
         thermal = np.sqrt(max(0.0, largest_of(energy, i_0, i_end)))
