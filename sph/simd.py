@@ -1,10 +1,10 @@
 """Explicit SIMD vectors in compiled code: several candidates of a particle per instruction.
 
 A vector (`Vec`) holds several numbers, one in each lane; a mask (`Mask`) holds as many truth
-values. Compiled code uses vectors like numbers: + - * / and comparisons, abs, np.sqrt, and `larger`
-and `smaller` of `sph.compiled`. In an operation of a vector and a number, the number applies to
-every lane, in the precision of the vector. The methods of models, such as kernels, therefore take
-vectors as they take numbers and NumPy arrays.
+values. Compiled code uses vectors like numbers: + - * / ** and comparisons, the NumPy functions in
+`sph.vector_functions`, and `larger` and `smaller` of `sph.compiled`. In an operation of a vector
+and a number, the number applies to every lane, in the precision of the vector. The methods of
+models, such as kernels, therefore take vectors as they take NumPy arrays.
 
 The arithmetic of a pass (`lanes`) decides the width and the precision when the pass is compiled:
 `DOUBLE`, `SINGLE`, or `SCALAR`, which computes one number at a time from the same source. LLVM
@@ -12,7 +12,6 @@ divides vectors that are wider than the registers of a processor, so the width i
 processor, and no function needs an instruction of one processor alone.
 """
 
-import math
 import operator
 from typing import NamedTuple
 
@@ -21,10 +20,19 @@ import numpy as np
 from llvmlite import ir
 from numba import types
 from numba.core import cgutils, config
+from numba.core.typeconv import Conversion
 from numba.core.typing.templates import AbstractTemplate, infer_global, signature
-from numba.extending import intrinsic, lower_builtin, models, overload, register_model
+from numba.extending import (
+    intrinsic,
+    lower_builtin,
+    lower_cast,
+    models,
+    overload,
+    register_model,
+)
 
 from sph.compiled import FASTMATH, INLINED, larger, smaller
+from sph.vector_functions import BINARY, UNARY
 
 FAST = tuple(sorted(FASTMATH))
 FASTEST = ("fast",)  # for a minimum and maximum, see `sph.compiled`
@@ -72,13 +80,20 @@ class Vec(types.Type):
         self.kind, self.width = kind, width
         super().__init__(f"Vec({kind}, {width})")
 
+    def unify(self, typingctx, other):
+        """A variable that is a vector or a number, depending on a condition, is a vector."""
+        return self if _is_number(other) else None
+
+    def can_convert_from(self, typingctx, other):
+        return Conversion.safe if _is_number(other) else None
+
 
 class Mask(types.Type):
-    """`width` truth values."""
+    """The truth values of a comparison of vectors of type `compared`."""
 
-    def __init__(self, width):
-        self.width = width
-        super().__init__(f"Mask({width})")
+    def __init__(self, compared):
+        self.compared, self.width = compared, compared.width
+        super().__init__(f"Mask({compared})")
 
 
 _KINDS = {
@@ -128,9 +143,10 @@ def _all(kind, value):
     return ir.Constant(kind, value)
 
 
-def _call(builder, name, kind: Vec, result, arguments, flags=FAST):
-    """Call the LLVM intrinsic `name` for vectors of a type."""
-    full = f"{name}.v{kind.width}{_SHORT[kind.kind]}"
+def _call(builder, name, kind, result, arguments, flags=FAST):
+    """Call the LLVM intrinsic `name` for vectors of a type, or for numbers."""
+    suffix = f"v{kind.width}{_SHORT[kind.kind]}" if isinstance(kind, Vec) else _SHORT[kind]
+    full = f"{name}.{suffix}"
     function_type = ir.FunctionType(result, [argument.type for argument in arguments])
     function = cgutils.get_or_insert_function(builder.module, function_type, full)
     return builder.call(function, arguments, fastmath=flags)
@@ -144,27 +160,40 @@ def _is_number(kind):
 
 
 def _as(context, builder, value, kind, wanted: Vec):
-    """Return a value of type `kind` as a vector of type `wanted`."""
+    """Return a value of type `kind` as a vector of type `wanted`; a mask is 1 where true."""
     if isinstance(kind, Vec):
         return value
+    if isinstance(kind, Mask):
+        return builder.uitofp(value, _llvm(wanted))
     return _filled(builder, context.cast(builder, value, kind, wanted.kind), wanted)
 
 
+def _vector_of(kinds):
+    """Return the type of the vectors among the operands; None if they cannot be combined."""
+    found = [one for one in kinds if isinstance(one, Vec)]
+    kind = found[0] if found else None
+    if kind is None or not isinstance(kind.kind, types.Float):
+        return None
+    matches = all(one in (kind, Mask(kind)) or _is_number(one) for one in kinds)
+    return kind if matches else None
+
+
+@lower_cast(types.Number, Vec)
+def _cast(context, builder, kind, wanted, value):
+    return _as(context, builder, value, kind, wanted)
+
+
 def _of_two(function, emit, result=lambda kind: kind):
-    """Define function(a, b) for two vectors, or a vector and a number."""
+    """Define function(a, b) for two vectors, or for a vector and a number or mask."""
 
     @infer_global(function)
     class Typed(AbstractTemplate):
         def generic(self, arguments, keywords):
-            vectors = [one for one in arguments if isinstance(one, Vec)]
-            if len(arguments) == 2 and vectors and not keywords:
-                kind = vectors[0]
-                if all(one == kind or _is_number(one) for one in arguments):
-                    return signature(result(kind), *arguments)
-            return None
+            kind = _vector_of(arguments) if len(arguments) == 2 and not keywords else None
+            return kind and signature(result(kind), *arguments)
 
     def lower(context, builder, sig, arguments):
-        kind = next(one for one in sig.args if isinstance(one, Vec))
+        kind = _vector_of(sig.args)
         a, b = (
             _as(context, builder, value, given, kind)
             for value, given in zip(arguments, sig.args, strict=True)
@@ -181,13 +210,26 @@ def _of_one(function, emit):
     @infer_global(function)
     class Typed(AbstractTemplate):
         def generic(self, arguments, keywords):
-            if len(arguments) == 1 and isinstance(arguments[0], Vec) and not keywords:
-                return signature(arguments[0], *arguments)
-            return None
+            kind = _vector_of(arguments) if len(arguments) == 1 and not keywords else None
+            return kind and signature(kind, *arguments)
 
     @lower_builtin(function, Vec)
     def lower(context, builder, sig, arguments):
         return emit(builder, sig.args[0], arguments[0])
+
+
+def _instruction(name):
+    return lambda builder, kind, *values: getattr(builder, name)(*values, flags=FAST)
+
+
+def _intrinsic(name, flags=FAST):
+    return lambda builder, kind, *values: _call(builder, name, kind, values[0].type, values, flags)
+
+
+def _comparison(sign):
+    # as in IEEE 754: with NaN, only != is true
+    compare = "fcmp_unordered" if sign == "!=" else "fcmp_ordered"
+    return lambda builder, kind, a, b: getattr(builder, compare)(sign, a, b)
 
 
 for _name, _functions in (
@@ -197,59 +239,83 @@ for _name, _functions in (
     ("fdiv", (operator.truediv, operator.itruediv)),
 ):
     for _function in _functions:
-        _of_two(
-            _function,
-            lambda builder, kind, a, b, name=_name: getattr(builder, name)(a, b, flags=FAST),
-        )
+        _of_two(_function, _instruction(_name))
 for _sign, _function in (
     ("<", operator.lt), ("<=", operator.le), (">", operator.gt), (">=", operator.ge),
+    ("==", operator.eq), ("!=", operator.ne),
 ):  # fmt: skip
-    _of_two(
-        _function,
-        lambda builder, kind, a, b, sign=_sign: builder.fcmp_ordered(sign, a, b),
-        lambda kind: Mask(kind.width),
+    _of_two(_function, _comparison(_sign), Mask)
+_of_two(operator.pow, _intrinsic("llvm.pow"))
+_of_two(larger, _intrinsic("llvm.maxnum", FASTEST))
+_of_two(smaller, _intrinsic("llvm.minnum", FASTEST))
+for _function, _name in BINARY.items():
+    _of_two(_function, _intrinsic(_name, FASTEST if _name.endswith("num") else FAST))
+for _function, _name in {abs: "llvm.fabs", **UNARY}.items():
+    _of_one(_function, _intrinsic(_name))
+_of_one(operator.neg, _instruction("fneg"))
+_of_one(operator.pos, lambda builder, kind, x: x)
+
+
+def _chosen_type(mask, a, b):
+    """Return the type of a where the mask is true, otherwise b; None without vectors."""
+    return _vector_of([a, b, mask.compared] if isinstance(mask, Mask) else [a, b])
+
+
+def _chosen(context, builder, sig, arguments):
+    kind = sig.return_type
+    a, b = (
+        _as(context, builder, value, given, kind)
+        if isinstance(kind, Vec)
+        else context.cast(builder, value, given, kind)
+        for value, given in zip(arguments[1:], sig.args[1:], strict=True)
     )
-for _name, _functions in (
-    ("llvm.maxnum", (larger, np.maximum)),
-    ("llvm.minnum", (smaller, np.minimum)),
-):
-    for _function in _functions:
-        _of_two(
-            _function,
-            lambda builder, kind, a, b, name=_name: _call(
-                builder, name, kind, a.type, (a, b), FASTEST
-            ),
-        )
-_of_two(
-    operator.pow, lambda builder, kind, a, b: _call(builder, "llvm.pow", kind, a.type, (a, b))
-)
-for _name, _functions in (
-    ("llvm.fabs", (abs, np.abs)),
-    ("llvm.sqrt", (np.sqrt, math.sqrt)),
-    ("llvm.exp", (np.exp, math.exp)),
-    ("llvm.log", (np.log, math.log)),
-):
-    for _function in _functions:
-        _of_one(
-            _function,
-            lambda builder, kind, x, name=_name: _call(builder, name, kind, x.type, (x,)),
-        )
-_of_one(operator.neg, lambda builder, kind, x: builder.fneg(x, flags=FAST))
+    return builder.select(arguments[0], a, b)
 
 
-for _name, _function in (("and_", operator.and_), ("or_", operator.or_)):
+@intrinsic
+def select(typing_context, mask, a, b):
+    """Return a in lanes where the mask is true, b in the others; also of numbers."""
+    return (_chosen_type(mask, a, b) or types.float64)(mask, a, b), _chosen
+
+
+@infer_global(np.where)
+class _Where(AbstractTemplate):
+    def generic(self, arguments, keywords):
+        kind = _chosen_type(*arguments) if len(arguments) == 3 and not keywords else None
+        return kind and signature(kind, *arguments)
+
+
+for _types in ((Mask, types.Any, types.Any), (types.Boolean, types.Any, types.Any)):
+    lower_builtin(np.where, *_types)(_chosen)
+
+
+for _name, _function in (
+    ("and_", operator.and_), ("or_", operator.or_), ("xor", operator.xor),
+):  # fmt: skip
 
     @infer_global(_function)
     class _OfMasks(AbstractTemplate):
         def generic(self, arguments, keywords):
-            if len(arguments) == 2 and isinstance(arguments[0], Mask):
-                if arguments[0] == arguments[1]:
-                    return signature(arguments[0], *arguments)
+            are_equal = len(arguments) == 2 and arguments[0] == arguments[1]
+            if are_equal and isinstance(arguments[0], Mask):
+                return signature(arguments[0], *arguments)
             return None
 
     @lower_builtin(_function, Mask, Mask)
     def _combine(context, builder, sig, arguments, name=_name):
         return getattr(builder, name)(*arguments)
+
+
+@infer_global(operator.invert)
+class _OfMask(AbstractTemplate):
+    def generic(self, arguments, keywords):
+        is_mask = len(arguments) == 1 and isinstance(arguments[0], Mask)
+        return signature(arguments[0], *arguments) if is_mask else None
+
+
+@lower_builtin(operator.invert, Mask)
+def _invert(context, builder, sig, arguments):
+    return builder.not_(arguments[0])
 
 
 # --- memory ---
@@ -263,8 +329,7 @@ def _place(context, builder, array_type, array, index_type, index):
     else:
         parts, kinds = [index], [index_type]
     parts = [
-        context.cast(builder, one, kind, types.intp)
-        for one, kind in zip(parts, kinds, strict=True)
+        context.cast(builder, one, kind, types.intp) for one, kind in zip(parts, kinds, strict=True)
     ]
     view = context.make_array(array_type)(context, builder, array)
     return cgutils.get_item_pointer(context, builder, array_type, view, parts, wraparound=False)
@@ -463,29 +528,6 @@ def numbers_from(typing_context, lanes, first):
     return kind(lanes, first), generate
 
 
-@intrinsic
-def select(typing_context, mask, a, b):
-    """Return a in lanes where the mask is true, b in the others."""
-    kind = next((one for one in (a, b) if isinstance(one, Vec)), types.float64)
-    if isinstance(mask, Mask) and not isinstance(kind, Vec):
-        kind = Vec(types.float64, mask.width)
-
-    def generate(context, builder, sig, arguments):
-        if not isinstance(kind, Vec):
-            a, b = (
-                context.cast(builder, value, given, kind)
-                for value, given in zip(arguments[1:], sig.args[1:], strict=True)
-            )
-        else:
-            a, b = (
-                _as(context, builder, value, given, kind)
-                for value, given in zip(arguments[1:], sig.args[1:], strict=True)
-            )
-        return builder.select(arguments[0], a, b)
-
-    return kind(mask, a, b), generate
-
-
 def summed(context, builder, kind, value):
     """Return LLVM code for the sum of all lanes, in double precision."""
     if not isinstance(kind, Vec):
@@ -514,9 +556,7 @@ def lane_max(typing_context, x):
         base = kind
         if isinstance(kind, Vec):
             base = kind.kind
-            value = _call(
-                builder, "llvm.vector.reduce.fmax", kind, _KINDS[base], (value,), FASTEST
-            )
+            value = _call(builder, "llvm.vector.reduce.fmax", kind, _KINDS[base], (value,), FASTEST)
         return context.cast(builder, value, base, types.float64)
 
     return types.float64(x), generate
@@ -553,36 +593,97 @@ def any_lane(typing_context, mask):
 # --- compaction ---
 
 
-def _has_avx512() -> bool:
-    """Return whether compiled code may use AVX-512 with vectors of any width."""
-    wanted = {"avx512f", "avx512vl"}
+def _instructions() -> str:
+    """Return which instructions that move lanes compiled code may use: avx512, avx2 or none."""
     if config.CPU_FEATURES is not None:
-        return wanted <= {one[1:] for one in config.CPU_FEATURES.split(",") if one[:1] == "+"}
-    if config.CPU_NAME not in (None, "host"):
-        return False
-    found = llvm.get_host_cpu_features()
-    return all(found.get(one, False) for one in wanted)
+        listed = config.CPU_FEATURES.split(",")
+        found = {one[1:]: True for one in listed if one[:1] == "+"}
+    else:
+        found = llvm.get_host_cpu_features()
+    names = {"avx512": ("avx512f", "avx512vl"), "avx2": ("avx2",)}
+    for name, needed in names.items():
+        if all(found.get(one, False) for one in needed):
+            return name
+    return ""
 
 
-PERMUTES = _has_avx512()
+INSTRUCTIONS = _instructions()
+AVX512 = INSTRUCTIONS == "avx512"
+
+HALF = 8  # lanes in a 256-bit register of 32-bit numbers
+
+
+def _packed(mask: int) -> int:
+    """Return the numbers of the bits of `mask` that are set, in order, one in each byte."""
+    there = [lane for lane in range(HALF) if mask >> lane & 1]
+    return sum(lane << 8 * place for place, lane in enumerate(there))
+
+
+def _table_entry(builder, bits):
+    """Return the numbers of the set bits of an 8-bit integer, in order, as 8 32-bit lanes."""
+    name, masks = "lanes_of_masks", range(1 << HALF)
+    table = builder.module.globals.get(name)
+    if table is None:
+        values = ir.Constant(ir.ArrayType(I64, len(masks)), [_packed(mask) for mask in masks])
+        table = cgutils.global_constant(builder, name, values)
+    place = builder.gep(table, [ir.Constant(I32, 0), builder.zext(bits, I32)], inbounds=True)
+    each = builder.bitcast(builder.load(place), ir.VectorType(ir.IntType(8), HALF))
+    return builder.zext(each, ir.VectorType(I32, HALF))
+
+
+def _permuted(builder, value, numbers):
+    """Return lanes of a vector of 8 32-bit numbers; only the last 3 bits of `numbers` count."""
+    floats = value.type.element == ir.FloatType()
+    name = "llvm.x86.avx2.permps" if floats else "llvm.x86.avx2.permd"
+    function_type = ir.FunctionType(value.type, [value.type, numbers.type])
+    function = cgutils.get_or_insert_function(builder.module, function_type, name)
+    return builder.call(function, (value, numbers))
+
+
+def _halves(builder, value):
+    """Return the first and the second half of a vector of 16 lanes."""
+    return [
+        builder.shuffle_vector(value, value, _indices(range(first, first + HALF)))
+        for first in (0, HALF)
+    ]
+
+
+def _front_of_both(builder, mask):
+    """Return the numbers of the true lanes of 16, in order, as two vectors of 8 lanes."""
+    first, second = (builder.bitcast(half, ir.IntType(HALF)) for half in _halves(builder, mask))
+    # the numbers in the second half are moved back by as many lanes as are free in the first
+    kind = ir.VectorType(I32, HALF)
+    lane = _indices(range(HALF))
+    used = _filled(builder, builder.zext(builder.ctpop(first), I32), Vec(types.int32, HALF))
+    moved = _permuted(builder, _table_entry(builder, second), builder.sub(lane, used))
+    moved = builder.or_(moved, ir.Constant(kind, [HALF] * HALF))
+    is_first = builder.icmp_signed("<", lane, used)
+    return builder.select(is_first, _table_entry(builder, first), moved), moved
 
 
 @intrinsic
 def front(typing_context, lanes, mask):
     """Return the numbers of the true lanes, in order, for `pick`."""
-    if not (isinstance(mask, Mask) and PERMUTES):
+    if not (isinstance(mask, Mask) and INSTRUCTIONS):
         return mask(lanes, mask), lambda context, builder, sig, arguments: arguments[1]
-    integer = types.int64 if lanes.instance_class.kind == types.float64 else types.int32
+    is_wide = AVX512 and lanes.instance_class.kind == types.float64
+    integer = types.int64 if is_wide else types.int32
     kind = Vec(integer, mask.width)
 
-    def generate(context, builder, sig, arguments):
+    def compressed(context, builder, sig, arguments):
         numbers = _indices(range(mask.width), _KINDS[integer])
         return _call(
             builder, "llvm.experimental.vector.compress", kind, _llvm(kind),
             (numbers, arguments[1], ir.Constant(_llvm(kind), ir.Undefined)), (),
         )  # fmt: skip
 
-    return kind(lanes, mask), generate
+    def looked_up(context, builder, sig, arguments):
+        if mask.width == HALF:
+            return _table_entry(builder, builder.bitcast(arguments[1], ir.IntType(HALF)))
+        first, second = _front_of_both(builder, arguments[1])
+        return builder.shuffle_vector(first, second, _indices(range(2 * HALF)))
+
+    return kind(lanes, mask), compressed if AVX512 else looked_up
 
 
 # Permutations of lanes by a vector of lane numbers.
@@ -599,11 +700,13 @@ def picked(builder, kind, value, lanes, chosen):
     if not isinstance(kind, Vec):
         return value
     result = _llvm(kind)
-    if isinstance(lanes, Mask):  # 28 cycles for 8 lanes on processors without AVX-512
+    if isinstance(lanes, Mask):  # through memory: 28 cycles for 8 lanes
         return _call(
             builder, "llvm.experimental.vector.compress", kind, result,
             (value, chosen, ir.Constant(result, ir.Undefined)), (),
         )  # fmt: skip
+    if not AVX512 and kind.width * kind.kind.bitwidth > 256:
+        return _picked_from_halves(builder, result, value, chosen)
     if lanes.kind == types.int64 and kind.kind != types.float64:
         chosen = builder.trunc(chosen, ir.VectorType(I32, kind.width))
     function = cgutils.get_or_insert_function(
@@ -612,6 +715,29 @@ def picked(builder, kind, value, lanes, chosen):
         _PERMUTATIONS[_SHORT[kind.kind], kind.width],
     )
     return builder.call(function, (value, chosen))
+
+
+def _picked_from_halves(builder, result, value, chosen):
+    """Return LLVM code for `pick` of two 256-bit registers: of 8 float64 or 16 float32 numbers."""
+    base = result.element
+    if base == ir.DoubleType():  # permuted as pairs of 32-bit numbers
+        base = I32
+        twice = builder.shuffle_vector(
+            chosen, chosen, _indices(lane for lane in range(HALF) for _ in range(2))
+        )
+        twice = builder.shl(twice, ir.Constant(twice.type, [1] * 2 * HALF))
+        chosen = builder.or_(twice, _indices([0, 1] * HALF))
+    whole = ir.VectorType(base, 2 * HALF)
+    low, high = _halves(builder, builder.bitcast(value, whole))
+    numbers, beyond = _halves(builder, chosen)
+    from_high = builder.icmp_unsigned(">=", numbers, ir.Constant(numbers.type, [HALF] * HALF))
+    first = builder.select(
+        from_high, _permuted(builder, high, numbers), _permuted(builder, low, numbers)
+    )
+    # the second half of the result comes from the second half of the value: no lane moves back
+    second = _permuted(builder, high, beyond)
+    both = builder.shuffle_vector(first, second, _indices(range(2 * HALF)))
+    return builder.bitcast(both, result)
 
 
 @intrinsic
@@ -642,7 +768,7 @@ _ESTIMATES = {
 
 def _guess(builder, x, kind, value, n, base):
     """Return LLVM code for a guess of value^(-1/n), and the numbers of terms of the steps."""
-    if n == 2 and PERMUTES and isinstance(x, Vec) and (base, x.width) in _ESTIMATES:
+    if n == 2 and AVX512 and isinstance(x, Vec) and (base, x.width) in _ESTIMATES:
         name, steps = _ESTIMATES[base, x.width]
         every = ir.IntType(max(8, x.width))
         function = cgutils.get_or_insert_function(
