@@ -12,7 +12,7 @@ import numpy as np
 
 from sph.compiled import VERBS
 from sph.declarations.messages import wrong
-from sph.vector_functions import BINARY, UNARY
+from sph.simd.functions import BINARY, UNARY
 
 _OF_VECTORS = {
     np.add, np.subtract, np.multiply, np.true_divide, np.power, np.negative, np.positive,

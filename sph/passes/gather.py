@@ -20,22 +20,28 @@ from numba.extending import overload
 from sph.compiled import INLINED, larger
 from sph.neighbours.lists import IMAGE_SHIFT
 from sph.neighbours.order import BLOCK
+from sph.passes.blocks import load_column, move
 from sph.simd import (
     block_width,
+    corner,
     count,
+    dot,
     filled_block,
     front,
+    larger_each,
     load,
     load_block,
     load_inside,
+    load_rows,
+    minus,
     numbers_from,
     pick,
     rows,
     store,
     store_inside,
+    times,
     width,
 )
-from sph.spatial import corner, dot, larger_each, load_column, load_rows, minus, move, times
 
 # Coordinate of lanes without a candidate, in units of the superblock. Such lanes have weight 0. The
 # square of FAR times that of a density must be a number in single precision.
@@ -256,6 +262,8 @@ def near_blocks(lanes, dim, boxes, number, low, high, reach, chosen):
         near = dot(gap, gap) < farthest * farthest
         store(chosen, m, pick(numbers_from(lanes, t), front(lanes, near)))
         m += count(near)
+    while m > 0 and chosen[m - 1] >= number:  # a reach beyond FAR chooses lanes beyond the list
+        m -= 1
     return m
 
 

@@ -22,8 +22,18 @@ from sph.passes.gather import (
     unit,
     unpacked,
 )
-from sph.simd import filled, lane_max, load, select, width
-from sph.spatial import at, dot, load_spatial, minus, times
+from sph.simd import (
+    at,
+    dot,
+    filled,
+    lane_max,
+    load,
+    load_spatial,
+    minus,
+    select,
+    times,
+    width,
+)
 
 
 @njit(**COMPILED)
@@ -34,7 +44,7 @@ def nearest(first, last, dim, _, neighbours, position, support, mass, density, r
     own. inf if there is no neighbour within the support radius.
     """
     D, lanes, lists = len(dim), neighbours.lanes, neighbours.lists
-    fields = dim + (0,)  # position, number of the particle
+    fields = dim + (0,)  # noqa: RUF005  # position, number of the particle
     copied, near, boxes, chosen = scratch(lanes, dim, longest_list(first, last, lists), fields)
     for superblock in range(first, last):
         begin, end = lists.first[superblock], lists.first[superblock + 1]

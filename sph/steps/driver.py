@@ -56,11 +56,10 @@ THUNK, BEGIN, ACTION, SWAPS, PHASE = range(5)
 # lists, the limit of the next step, and the addresses of the two arrays that a pass may swap.
 DT, REACHED, NEXT_DT, FIRST, SECOND = range(5)
 
-OPTIONS: dict[str, Any] = {"cache": True, "nogil": True, "error_model": "numpy"}
+FLAGS: dict[str, Any] = {"error_model": "numpy", "no_cfunc_wrapper": True}
+OPTIONS: dict[str, Any] = {"cache": True, "nogil": True, **FLAGS}
 # of functions that only `take` calls: without wrappers for calls from Python
-HELPER: dict[str, Any] = {
-    "error_model": "numpy", "no_cpython_wrapper": True, "no_cfunc_wrapper": True,
-}  # fmt: skip
+HELPER: dict[str, Any] = {"no_cpython_wrapper": True, **FLAGS}
 
 
 @njit(**OPTIONS)
@@ -215,7 +214,8 @@ def found(wanted, density):
     for i in range(density.size):
         good = good and not density[i] < 0.0
     if good:
-        wanted[:] = 1.0
+        for block in range(wanted.size):
+            wanted[block] = 1.0
     return 1.0 if good else 0.0
 
 

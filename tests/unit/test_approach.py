@@ -190,7 +190,7 @@ def test_cold_clouds_colliding_conserve_energy(begin, monkeypatch, dimension, si
 
 def test_compiled_steps_are_bounded_by_approach(begin, monkeypatch):
     monkeypatch.setattr(steps, "ORDINARY", 1)
-    scene = scene_of(*meeting(1, 50), 0.1, max_energy_drift=1e9)
+    scene = scene_of(*meeting(1, 50, speed=1.0), 0.1, max_energy_drift=1e9)
     one, other = begin(scene), begin(scene)
     drift(other, 0.1)
     while one.time < 0.1:

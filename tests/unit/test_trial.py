@@ -12,7 +12,7 @@ from sph.errors import DeclarationError
 from sph.kernels import Defaults
 from sph.model import model
 from sph.scene import Scene
-from sph.vector_functions import BINARY, UNARY
+from sph.simd.functions import BINARY, UNARY
 
 
 def kernel(expression):
@@ -75,9 +75,7 @@ def test_accepted_expressions_compile_on_vectors(name):
         f"    store(out, ({k}, 0), filled(lanes, {one}))".replace("self.", "").replace("dim", "d")
         for k, one in enumerate(ACCEPTED)
     )
-    run = compiled(
-        f"def run(lanes, d, x, a, flag, out):\n    q = load(lanes, x, 0)\n{mine}", larger=larger
-    )
+    run = compiled(f"def run(lanes, d, x, a, flag, out):\n    q = load(lanes, x, 0)\n{mine}")
     x = np.linspace(0.1, 1.2, 16).astype(kind)
     out = np.zeros((len(ACCEPTED), 16), kind)
     run(lanes, (0, 0), x, 0.5, True, out)

@@ -30,19 +30,28 @@ from sph.passes.gather import (
     unit,
     unpacked,
 )
-from sph.simd import count, filled, front, inverse_sqrt, lane_sum, load, pick, rows, store, width
-from sph.spatial import (
+from sph.simd import (
     at,
+    count,
     cross,
     curl_dim,
     dot,
+    filled,
+    front,
+    inverse_sqrt,
+    lane_sum,
     lane_sums,
+    load,
     load_spatial,
     minus,
+    pick,
     pick_spatial,
     plus,
+    rows,
+    store,
     store_spatial,
     times,
+    width,
     zeros,
 )
 
@@ -69,8 +78,8 @@ def density(
     """
     D, lanes = len(dim), neighbours.lanes
     weighting, lists = models.weighting, neighbours.lists
-    fields = dim + (0,)  # position, weight, velocity, m u
-    fields = also(also(fields, div_v, dim), energy_shift, (0,))
+    # position, weight, velocity, m u; Numba does not know (*dim, 0)
+    fields = also(also(dim + (0,), div_v, dim), energy_shift, (0,))  # noqa: RUF005
     copied, near, boxes, chosen = scratch(lanes, dim, longest_list(first, last, lists), fields)
     pairs = rows(lanes, CURL + 3, near.shape[1])
     settled = np.empty(BLOCK, np.bool_)
@@ -81,7 +90,9 @@ def density(
         i_0, i_end = begin * BLOCK, min(end * BLOCK, mass.size)
         x_0, v_0 = at(dim, position, i_0), at(dim, velocity, i_0)
         per_length = unit(largest_of(support_before, i_0, i_end))
-        per_velocity = unit(fastest(dim, velocity, i_0, i_end))
+        # beside fast neighbours, gas at rest must not have the unit of its round-off
+        thermal = np.sqrt(max(0.0, largest_of(energy, i_0, i_end)))
+        per_velocity = unit(max(fastest(dim, velocity, i_0, i_end), thermal))
         per_mass = unit(weight(weighting, largest_of(mass, i_0, i_end)))
         per_energy = per_mass * unit(largest_of(energy, i_0, i_end))
         per_density = per_mass / per_length**D
@@ -93,10 +104,10 @@ def density(
             place_block(lanes, dim, copied, to, position, block, neighbours, image, x_0, per_length)
             copy_weights(lanes, copied, to + D * BLOCK, weighting, mass, block, per_mass)
             if div_v is not None:
+                after = to + (D + 1) * BLOCK
                 copy_vectors(
-                    lanes, dim, copied, to + (D + 1) * BLOCK, velocity, block, neighbours, image, v_0,
-                    per_velocity,
-                )  # fmt: skip
+                    lanes, dim, copied, after, velocity, block, neighbours, image, v_0, per_velocity
+                )
             if energy_shift is not None:
                 last_field = to + (len(fields) - 1) * BLOCK
                 copy_products(lanes, copied, last_field, mass, energy, block, per_energy)
@@ -121,8 +132,8 @@ def density(
                     x_i = times(minus(at(dim, position, i), x_0), per_length)
                     v_i = times(minus(at(dim, velocity, i), v_0), per_velocity)
                     n = _select(
-                        lanes, dim, near, nc, len(fields) - 1, x_i, v_i, reach, div_v, curl_v, energy_shift,
-                        pairs,
+                        lanes, dim, near, nc, len(fields) - 1, x_i, v_i, reach, div_v, curl_v,
+                        energy_shift, pairs,
                     )  # fmt: skip
                     H, n_i, Omega_i, needed = find_support(
                         models.smoothing, lanes, models.kernel, dim, pairs, n,
@@ -194,8 +205,9 @@ def _select(
     for row in range(1, CURL + 3):
         store(pairs, (row, n), filled(lanes, 0.0))
     for k in range(0, n, width(lanes)):
-        squared = load(lanes, pairs, (R, k)) + TINY
-        store(pairs, (R, k), squared * inverse_sqrt(squared))
+        squared = load(lanes, pairs, (R, k))
+        # 0 for particles in one place, which no support radius separates
+        store(pairs, (R, k), squared * inverse_sqrt(squared + TINY))
     return n
 
 

@@ -31,17 +31,25 @@ from sph.passes.gather import (
 )
 from sph.simd import (
     any_lane,
+    at,
     block_width,
+    dot,
     filled,
     inverse_sqrt,
     lane_max,
     lane_sum,
+    lane_sums,
     load,
+    load_spatial,
+    minus,
+    plus,
+    put,
     select,
     store,
+    times,
     width,
+    zeros,
 )
-from sph.spatial import at, dot, lane_sums, load_spatial, minus, plus, put, times, zeros
 
 # Quantities of candidates after position and velocity.
 RHO, P_TERM, C_S, H_INV, M_HALF, M_GRADIENT, NEXT = 0, 1, 2, 3, 4, 5, 6
@@ -126,6 +134,7 @@ def rates(
                 x_i = times(minus(at(dim, position, i), x_0), per_length)
                 v_i = times(minus(at(dim, velocity, i), v_0), per_velocity)
                 rho_i, c_i = density[i] * per_density, sound_speed[i] * per_velocity
+                rho_inv_i = 1.0 / rho_i
                 P_term_i = pressure_term[i] * per_term
                 H_inv_i = 1.0 / (support[i] * per_length)
                 gradient_i = H_inv_i ** (D + 2)
@@ -141,7 +150,7 @@ def rates(
                     squared = dot(r_ij, r_ij) + TINY
                     v_dot_r = dot(v_ij, r_ij)
                     rho_j = load(lanes, near, (rest + RHO, k))
-                    rho_sum = rho_i + rho_j
+                    rho_sum = 1.0 + rho_j * rho_inv_i  # over rho_i, lest its square underflow
                     # one root serves 1/r and 1/(rho_i + rho_j)
                     inverse = inverse_sqrt(squared * (rho_sum * rho_sum))
                     r_inv = inverse * rho_sum
@@ -156,7 +165,7 @@ def rates(
                     # eq 24: alpha/2 v_sig w_ij/rho_ij with rho_ij = (rho_i + rho_j)/2
                     alpha_j = load_of(alpha, lanes, near, a_row, k)
                     alpha_ij = pair_alpha(viscosity, value_of(alpha, i), alpha_j)
-                    Pi = (v_sig * w_ij) * (inverse * r) * -alpha_ij
+                    Pi = (v_sig * w_ij) * (inverse * r) * (-rho_inv_i * alpha_ij)
                     if balsara is not None:
                         Pi *= 0.5 * balsara[i] + load(lanes, near, (f_row, k))
                     term_i, term_j = _terms(
@@ -175,7 +184,7 @@ def rates(
                         )  # fmt: skip
                         # Price (2008) eq 27: over rho_ij = (rho_i + rho_j)/2
                         jump = exchanged[i] * per_energy - load(lanes, near, (u_row, k))
-                        exchange = speed * jump * 2.0 * (inverse * r)
+                        exchange = speed * jump * (2.0 * rho_inv_i) * (inverse * r)
                         if shares is not None:
                             exchange *= 0.5 * shares[i] + load(lanes, near, (share_row, k))
                         gained += (slope_i + slope_j) * r * exchange  # slope r is m_j dW/dr
@@ -213,7 +222,7 @@ def _pressure_terms(
 
 @njit(**INLINED)
 def _within(lanes, dim, near, nc, h_row, x_i, H_inv_i, used):
-    """Write to `used` the columns at which a group of lanes with a neighbour begins; return how many.
+    """Write to `used` where groups of lanes with a neighbour begin; return their number.
 
     Candidates are in the order of space, so that a third of the groups has no neighbour.
     """

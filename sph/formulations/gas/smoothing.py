@@ -1,11 +1,11 @@
 """Support radius H and density of a particle from its neighbours (step 2).
 
 Both methods use the distances and weights (by default masses, see `weighting`) of the n candidates
-of a particle, which are rows of the array `pairs`, in any units. They return (H, sum of weights, Omega, wanted); with masses
-as weights the sum is the density rho. The candidates are complete up to the radius `reach`. If H
-exceeds `reach`, `wanted` is the radius that the candidates must reach before the next attempt;
-otherwise it is 0.0. If there is no root up to `largest`, H is `largest` and Omega is 1, because H
-does not depend on the density.
+of a particle, which are rows of the array `pairs`, in any units. They return (H, sum of weights,
+Omega, wanted); with masses as weights the sum is the density rho. The candidates are complete up to
+the radius `reach`. If H exceeds `reach`, `wanted` is the radius that the candidates must reach
+before the next attempt; otherwise it is 0.0. If there is no root up to `largest`, H is `largest`
+and Omega is 1, because H does not depend on the density.
 """
 
 from typing import NamedTuple
@@ -89,10 +89,10 @@ def find_support(smoothing, lanes, kernel, dim, pairs, n, mass, H, ratio, reach,
         rho = C * H_inv**D * sum_w  # eq 7
         before = H_inv
         H_inv = max(_per_spacing(dim, rho * mass_inv) * ratio_inv, largest_inv)  # eq 15
-    if smoothing.passes > 0 and abs(before - H_inv) <= smoothing.unsettled * H_inv:
-        if H_inv > largest_inv:
-            H = 1.0 / H_inv
-            return H, rho, Omega, (0.0 if reach >= H else H)
+    settled = abs(before - H_inv) <= smoothing.unsettled * H_inv and H_inv > largest_inv
+    if settled and smoothing.passes > 0:
+        H = 1.0 / H_inv
+        return H, rho, Omega, (0.0 if reach >= H else H)
     return _solve(
         lanes, kernel, dim, pairs, n, mass, 1.0 / before, ratio, reach, largest,
         smoothing.tolerance,

@@ -1,4 +1,4 @@
-"""Quantities of the particles of a block from density and energy: EOS, Balsara factor, rate of alpha.
+"""Quantities of a block from density and energy: EOS, Balsara factor, rate of alpha.
 
 The density pass calls these functions after its sums; the pair loops of the rate pass use only
 their results. Arrays are (N,).

@@ -26,17 +26,21 @@ from sph.passes.gather import (
     unpacked,
 )
 from sph.simd import (
+    at,
     block_width,
+    dot,
     filled,
     inverse_sqrt,
     lane_max,
     lane_sum,
     load,
+    load_spatial,
+    minus,
     select,
     store,
+    times,
     width,
 )
-from sph.spatial import at, dot, load_spatial, minus, times
 
 COLD = 1e-300  # gives 0 instead of 0/0 in uniform cold gas
 
@@ -87,11 +91,24 @@ def contacts(
             to = t * len(fields) * BLOCK
             place_block(lanes, dim, copied, to, position, block, neighbours, image, x_0, per_length)
             copy_vectors(
-                lanes, dim, copied, to + D * BLOCK, velocity, block, neighbours, image, v_0, per_velocity
+                lanes,
+                dim,
+                copied,
+                to + D * BLOCK,
+                velocity,
+                block,
+                neighbours,
+                image,
+                v_0,
+                per_velocity,
             )
             copy_values(lanes, copied, to + (rest + U) * BLOCK, energy, block, per_energy)
-            copy_values(lanes, copied, to + (rest + C_HALF) * BLOCK, sound_speed, block, 0.5 * per_velocity)
-            _copy_volumes(lanes, copied, to + (rest + VOLUME) * BLOCK, mass, density, block, per_length**D)
+            copy_values(
+                lanes, copied, to + (rest + C_HALF) * BLOCK, sound_speed, block, 0.5 * per_velocity
+            )
+            _copy_volumes(
+                lanes, copied, to + (rest + VOLUME) * BLOCK, mass, density, block, per_length**D
+            )
         for block in range(begin, end):
             low, high = own_box(dim, neighbours, block, x_0, per_length)
             i_first, i_last = block * BLOCK, min((block + 1) * BLOCK, mass.size)

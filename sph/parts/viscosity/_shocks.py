@@ -32,21 +32,26 @@ from sph.passes.gather import (
     unpacked,
 )
 from sph.simd import (
+    at,
     block_width,
     count,
+    dot,
     filled,
     front,
     inverse_sqrt,
     lane_max,
     lane_sum,
     load,
-    pick,
+    load_spatial,
+    minus,
+    pick_spatial,
     rows,
     select,
     store,
+    store_spatial,
+    times,
     width,
 )
-from sph.spatial import at, dot, load_spatial, minus, pick_spatial, store_spatial, times
 
 # A pivot below this fraction of the trace means that neighbours lie on a line or in a plane. The
 # gradient is then undefined and set to zero.
@@ -133,14 +138,25 @@ def shocks(
             to = t * len(fields) * BLOCK
             place_block(lanes, dim, copied, to, position, block, neighbours, image, x_0, per_length)
             copy_vectors(
-                lanes, dim, copied, to + D * BLOCK, velocity, block, neighbours, image, v_0, per_velocity
+                lanes,
+                dim,
+                copied,
+                to + D * BLOCK,
+                velocity,
+                block,
+                neighbours,
+                image,
+                v_0,
+                per_velocity,
             )
             copy_vectors(
                 lanes, dim, copied, to + 2 * D * BLOCK, acceleration, block, neighbours, image, a_0,
                 per_acceleration,
             )  # fmt: skip
             copy_weights(lanes, copied, to + m_row * BLOCK, weighting, mass, block, per_mass)
-            _copy_signs(lanes, copied, to + signed_row * BLOCK, weighting, mass, div_v, block, per_mass)
+            _copy_signs(
+                lanes, copied, to + signed_row * BLOCK, weighting, mass, div_v, block, per_mass
+            )
             copy_values(lanes, copied, to + c_row * BLOCK, sound_speed, block, 0.5 * per_velocity)
         for block in range(begin, end):
             low, high = own_box(dim, neighbours, block, x_0, per_length)

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 from lanes import LANES, compiled, precision
 
-from sph import simd, spatial
+from sph import simd
 from sph.neighbours.order import BLOCK
+from sph.passes import blocks
 
 SCENES = [(3, "double"), (3, "single"), (3, "scalar"), (2, "double"), (1, "single")]
 every_scene = pytest.mark.parametrize(("dimension", "name"), SCENES)
@@ -16,7 +17,7 @@ every_scene = pytest.mark.parametrize(("dimension", "name"), SCENES)
 def compile_spatial(body, arguments):
     return compiled(
         f"def run(lanes, dim, {arguments}):\n" + "".join(f"    {one}\n" for one in body),
-        **vars(spatial),
+        **vars(blocks),
     )
 
 

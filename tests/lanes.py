@@ -5,7 +5,7 @@ import pytest
 from numba import njit
 
 from sph import simd
-from sph.compiled import FLAGS
+from sph.compiled import FLAGS, larger, smaller
 
 LANES = {"double": simd.DOUBLE, "single": simd.SINGLE, "scalar": simd.SCALAR}
 every_lanes = pytest.mark.parametrize("lanes", LANES.values(), ids=LANES)
@@ -18,6 +18,6 @@ def precision(lanes):
 
 def compiled(source, **names):
     """The function `run` that `source` defines, compiled; names: what it uses."""
-    space = {**vars(simd), "np": np, **names}
+    space = {**vars(simd), "larger": larger, "smaller": smaller, "np": np, **names}
     exec(source, space)
     return njit(**FLAGS)(space["run"])

@@ -11,6 +11,7 @@ from lanes import LANES, compiled, every_lanes, precision
 
 from sph import compiled as of_sph
 from sph import simd
+from sph.simd.memory import CACHE_LINE
 
 N = 32  # a multiple of all widths
 EXPRESSIONS = [
@@ -170,7 +171,7 @@ def test_rows_are_aligned_in_precision_of_lanes(lanes):
         made = run(lanes, 3, length)
         assert made.shape == (3, length)
         assert made.dtype == precision(lanes)
-        assert made.ctypes.data % simd.CACHE_LINE == 0
+        assert made.ctypes.data % CACHE_LINE == 0
 
 
 @every_lanes
@@ -292,7 +293,7 @@ def test_other_instructions_pass_the_same_tests(name):
     here = os.path.dirname(__file__)
     found = subprocess.run(
         [sys.executable, "-m", "pytest", "-q", "-n0", "-m", "not slow", "-k", "not threads",
-         f"{here}/test_simd.py", f"{here}/test_spatial.py", f"{here}/test_engine.py"],
+         f"{here}/test_simd.py", f"{here}/test_spatial.py", f"{here}/../test_engine.py"],
         env=os.environ | PROCESSORS[name], capture_output=True, text=True, timeout=600, check=False,
     )  # fmt: skip
     assert found.returncode == 0, found.stdout[-3000:]

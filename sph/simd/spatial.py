@@ -6,10 +6,20 @@ of dimensions is the length of `dim`, a constant for the compiler; no loop remai
 
 from numba import types
 from numba.core import cgutils
-from numba.extending import intrinsic
 
-from sph.neighbours.order import BLOCK
-from sph.simd import FAST, FASTEST, Vec, _as, _call, _llvm, _place, _vector, picked, summed
+from sph.simd.compaction import picked
+from sph.simd.lanes import summed
+from sph.simd.memory import address, lanes_at, put_lanes
+from sph.simd.types import (
+    FAST,
+    FASTEST,
+    Vec,
+    as_vector,
+    call,
+    instruction,
+    llvm_type,
+    vector_type,
+)
 
 
 def _parts(context, builder, kind, value, wanted):
@@ -18,7 +28,7 @@ def _parts(context, builder, kind, value, wanted):
     kinds = list(kind)
     if isinstance(wanted, Vec):
         return [
-            _as(context, builder, one, each, wanted)
+            as_vector(context, builder, one, each, wanted)
             for one, each in zip(found, kinds, strict=True)
         ]
     return [
@@ -32,59 +42,57 @@ def _common(*kinds):
     return next((one for one in parts if isinstance(one, Vec)), types.float64)
 
 
-def _tuple(context, builder, kind, parts):
-    return context.make_tuple(builder, kind, parts)
+def element(context, builder, array_type, array, *index):
+    """Return the address of an element; index: numbers or LLVM integers."""
+    pair = types.UniTuple(types.intp, len(index))
+    parts = [
+        context.get_constant(types.intp, one) if isinstance(one, int) else one for one in index
+    ]
+    return address(
+        context, builder, array_type, array, pair, context.make_tuple(builder, pair, parts)
+    )
 
 
-@intrinsic
+def integer_plus(context, builder, value, kind, more=0):
+    """Return a number as an LLVM integer, plus a constant."""
+    number = context.cast(builder, value, kind, types.intp)
+    return builder.add(number, context.get_constant(types.intp, more))
+
+
+@instruction
 def at(typing_context, dim, field, i):
     """Return field[:, i] of an array (D, N)."""
     result = types.UniTuple(field.dtype, len(dim))
 
     def generate(context, builder, sig, arguments):
-        _, array, index = arguments
-        parts = []
-        for d in range(len(dim)):
-            pair = types.UniTuple(types.intp, 2)
-            where = context.cast(builder, index, sig.args[2], types.intp)
-            index_pair = context.make_tuple(
-                builder, pair, [context.get_constant(types.intp, d), where]
-            )
-            parts.append(
-                builder.load(_place(context, builder, sig.args[1], array, pair, index_pair))
-            )
-        return _tuple(context, builder, result, parts)
+        _, array, i = arguments
+        i = integer_plus(context, builder, i, sig.args[2])
+        parts = [
+            builder.load(element(context, builder, sig.args[1], array, d, i))
+            for d in range(len(dim))
+        ]
+        return context.make_tuple(builder, result, parts)
 
     return result(dim, field, i), generate
-
-
-def _read(builder, place, kind, array):
-    loaded = builder.load(builder.bitcast(place, _llvm(kind).as_pointer()))
-    loaded.align = array.dtype.bitwidth // 8
-    return loaded
 
 
 def _row_reader(of_width):
     """A function that reads lanes of a vector from the rows row, row + 1, … of an array."""
 
-    @intrinsic
+    @instruction
     def read(typing_context, lanes, dim, array, row, k):
-        kind = _vector(lanes.instance_class.kind, of_width(lanes.instance_class))
+        kind = vector_type(lanes.instance_class.kind, of_width(lanes.instance_class))
         result = types.UniTuple(kind, len(dim))
 
         def generate(context, builder, sig, arguments):
             _, _, array, row, k = arguments
-            pair = types.UniTuple(types.intp, 2)
-            row = context.cast(builder, row, sig.args[3], types.intp)
-            k = context.cast(builder, k, sig.args[4], types.intp)
+            k = integer_plus(context, builder, k, sig.args[4])
             parts = []
             for d in range(len(dim)):
-                index = context.make_tuple(
-                    builder, pair, [builder.add(row, context.get_constant(types.intp, d)), k]
-                )
-                place = _place(context, builder, sig.args[2], array, pair, index)
-                parts.append(_read(builder, place, kind, sig.args[2]))
-            return _tuple(context, builder, result, parts)
+                one = integer_plus(context, builder, row, sig.args[3], d)
+                place = element(context, builder, sig.args[2], array, one, k)
+                parts.append(lanes_at(builder, place, kind))
+            return context.make_tuple(builder, result, parts)
 
         return result(lanes, dim, array, row, k), generate
 
@@ -95,83 +103,33 @@ load_spatial = _row_reader(lambda lanes: lanes.width)
 load_rows = _row_reader(lambda lanes: lanes.block_width)
 
 
-@intrinsic
-def load_column(typing_context, lanes, dim, array, begin):
-    """Return lanes of a vector whose components are BLOCK numbers apart, from array[begin]."""
-    kind = _vector(lanes.instance_class.kind, lanes.instance_class.block_width)
-    result = types.UniTuple(kind, len(dim))
-
-    def generate(context, builder, sig, arguments):
-        _, _, array, begin = arguments
-        parts = []
-        for d in range(len(dim)):
-            index = builder.add(
-                context.cast(builder, begin, sig.args[3], types.intp),
-                context.get_constant(types.intp, d * BLOCK),
-            )
-            place = _place(context, builder, sig.args[2], array, types.intp, index)
-            parts.append(_read(builder, place, kind, sig.args[2]))
-        return _tuple(context, builder, result, parts)
-
-    return result(lanes, dim, array, begin), generate
-
-
-@intrinsic
-def move(typing_context, lanes, fields, copied, begin, chosen, near, k):
-    """Write the `chosen` lanes of all quantities of a block to the columns of `near` from k.
-
-    Quantity f of the block begins at copied[begin + f BLOCK], and has row f of `near`.
-    """
-    kind = _vector(lanes.instance_class.kind, lanes.instance_class.block_width)
-
-    def generate(context, builder, sig, arguments):
-        _, _, copied, begin, chosen, near, k = arguments
-        kinds = sig.args
-        begin = context.cast(builder, begin, kinds[3], types.intp)
-        k = context.cast(builder, k, kinds[6], types.intp)
-        pair = types.UniTuple(types.intp, 2)
-        for f in range(len(fields)):
-            index = builder.add(begin, context.get_constant(types.intp, f * BLOCK))
-            place = _place(context, builder, kinds[2], copied, types.intp, index)
-            value = picked(builder, kind, _read(builder, place, kind, kinds[2]), kinds[4], chosen)
-            index = context.make_tuple(builder, pair, [context.get_constant(types.intp, f), k])
-            place = _place(context, builder, kinds[5], near, pair, index)
-            stored = builder.store(value, builder.bitcast(place, value.type.as_pointer()))
-            stored.align = kinds[5].dtype.bitwidth // 8
-        return context.get_dummy_value()
-
-    return types.void(lanes, fields, copied, begin, chosen, near, k), generate
-
-
-@intrinsic
+@instruction
 def corner(typing_context, dim, corners, block, first):
     """Return corners[block, first:first + D] of an array."""
     result = types.UniTuple(types.float64, len(dim))
 
     def generate(context, builder, sig, arguments):
         _, array, block, first = arguments
-        pair = types.UniTuple(types.intp, 2)
-        block = context.cast(builder, block, sig.args[2], types.intp)
-        first = context.cast(builder, first, sig.args[3], types.intp)
+        block = integer_plus(context, builder, block, sig.args[2])
         parts = []
         for d in range(len(dim)):
-            column = builder.add(first, context.get_constant(types.intp, d))
-            index = context.make_tuple(builder, pair, [block, column])
-            parts.append(builder.load(_place(context, builder, sig.args[1], array, pair, index)))
-        return _tuple(context, builder, result, parts)
+            column = integer_plus(context, builder, first, sig.args[3], d)
+            place = element(context, builder, sig.args[1], array, block, column)
+            parts.append(builder.load(place))
+        return context.make_tuple(builder, result, parts)
 
     return result(dim, corners, block, first), generate
 
 
-@intrinsic
+@instruction
 def zeros(typing_context, lanes, dim):
     """Return a vector of space whose components are zero in every lane."""
-    kind = _vector(lanes.instance_class.kind, lanes.instance_class.width)
+    kind = vector_type(lanes.instance_class.kind, lanes.instance_class.width)
     result = types.UniTuple(kind, len(dim))
 
     def generate(context, builder, sig, arguments):
-        zero = cgutils.get_null_value(_llvm(kind))
-        return _tuple(context, builder, result, [zero] * len(dim))
+        zero = cgutils.get_null_value(llvm_type(kind))
+        return context.make_tuple(builder, result, [zero] * len(dim))
 
     return result(lanes, dim), generate
 
@@ -179,7 +137,7 @@ def zeros(typing_context, lanes, dim):
 def _componentwise(emit):
     """Define f(a, b) for two vectors of space, or one and a factor."""
 
-    @intrinsic
+    @instruction
     def operation(typing_context, a, b):
         kind = _common(a, b)
         size = len(a) if isinstance(a, types.BaseTuple) else len(b)
@@ -192,13 +150,13 @@ def _componentwise(emit):
                     pairs.append(_parts(context, builder, one, value, kind))
                 else:
                     same = (
-                        _as(context, builder, value, one, kind)
+                        as_vector(context, builder, value, one, kind)
                         if isinstance(kind, Vec)
                         else context.cast(builder, value, one, kind)
                     )
                     pairs.append([same] * size)
             parts = [emit(builder, kind, x, y) for x, y in zip(*pairs, strict=True)]
-            return _tuple(context, builder, result, parts)
+            return context.make_tuple(builder, result, parts)
 
         return result(a, b), generate
 
@@ -211,11 +169,11 @@ times = _componentwise(lambda builder, kind, a, b: builder.fmul(a, b, flags=FAST
 
 
 larger_each = _componentwise(
-    lambda builder, kind, a, b: _call(builder, "llvm.maxnum", kind, a.type, (a, b), FASTEST)
+    lambda builder, kind, a, b: call(builder, "llvm.maxnum", kind, a.type, (a, b), FASTEST)
 )
 
 
-@intrinsic
+@instruction
 def dot(typing_context, a, b):
     """Return the scalar product of two vectors of space."""
     kind = _common(a, b)
@@ -232,7 +190,7 @@ def dot(typing_context, a, b):
     return kind(a, b), generate
 
 
-@intrinsic
+@instruction
 def cross(typing_context, a, b):
     """Return the cross product: 3 components in 3-D, the component normal to the plane in 2-D."""
     kind = _common(a, b)
@@ -248,60 +206,55 @@ def cross(typing_context, a, b):
             return builder.fsub(first, second, flags=FAST)
 
         axes = [(1, 2), (2, 0), (0, 1)] if len(x) == 3 else [(0, 1)]
-        return _tuple(context, builder, result, [minor(i, j) for i, j in axes])
+        return context.make_tuple(builder, result, [minor(i, j) for i, j in axes])
 
     return result(a, b), generate
 
 
-@intrinsic
+@instruction
 def lane_sums(typing_context, a):
     """Return the sums over all lanes of each component, in double precision."""
     result = types.UniTuple(types.float64, len(a))
 
     def generate(context, builder, sig, arguments):
         parts = cgutils.unpack_tuple(builder, arguments[0])
-        return _tuple(
-            context, builder, result, [summed(context, builder, a.dtype, one) for one in parts]
+        return context.make_tuple(
+            builder, result, [summed(context, builder, a.dtype, one) for one in parts]
         )
 
     return result(a), generate
 
 
-@intrinsic
+@instruction
 def put(typing_context, field, i, a):
     """Set field[:, i] of an array (D, N)."""
 
     def generate(context, builder, sig, arguments):
-        array, index, value = arguments
-        pair = types.UniTuple(types.intp, 2)
-        where = context.cast(builder, index, sig.args[1], types.intp)
+        array, i, value = arguments
+        i = integer_plus(context, builder, i, sig.args[1])
         for d, one in enumerate(cgutils.unpack_tuple(builder, value)):
-            index_pair = context.make_tuple(
-                builder, pair, [context.get_constant(types.intp, d), where]
-            )
-            builder.store(one, _place(context, builder, sig.args[0], array, pair, index_pair))
+            builder.store(one, element(context, builder, sig.args[0], array, d, i))
         return context.get_dummy_value()
 
     return types.void(field, i, a), generate
 
 
-@intrinsic
+@instruction
 def curl_dim(typing_context, dim):
     """Return a tuple with as many entries as the cross product has components."""
     result = types.UniTuple(types.intp, 3 if len(dim) == 3 else 1)
 
     def generate(context, builder, sig, arguments):
         zero = context.get_constant(types.intp, 0)
-        return _tuple(context, builder, result, [zero] * len(result))
+        return context.make_tuple(builder, result, [zero] * len(result))
 
     return result(dim), generate
 
 
-@intrinsic
+@instruction
 def pick_spatial(typing_context, a, lanes):
     """Apply `sph.simd.pick` to each component."""
-    return a(a, lanes), lambda context, builder, sig, arguments: _tuple(
-        context,
+    return a(a, lanes), lambda context, builder, sig, arguments: context.make_tuple(
         builder,
         a,
         [
@@ -311,22 +264,16 @@ def pick_spatial(typing_context, a, lanes):
     )
 
 
-@intrinsic
+@instruction
 def store_spatial(typing_context, array, row, k, a):
     """Write the lanes of each component to the rows row, row + 1, … of a scratch array."""
 
     def generate(context, builder, sig, arguments):
         array, row, k, value = arguments
-        pair = types.UniTuple(types.intp, 2)
-        row = context.cast(builder, row, sig.args[1], types.intp)
-        k = context.cast(builder, k, sig.args[2], types.intp)
-        for d, one in enumerate(cgutils.unpack_tuple(builder, value)):
-            index = context.make_tuple(
-                builder, pair, [builder.add(row, context.get_constant(types.intp, d)), k]
-            )
-            place = _place(context, builder, sig.args[0], array, pair, index)
-            stored = builder.store(one, builder.bitcast(place, one.type.as_pointer()))
-            stored.align = sig.args[0].dtype.bitwidth // 8
+        k = integer_plus(context, builder, k, sig.args[2])
+        for d, part in enumerate(cgutils.unpack_tuple(builder, value)):
+            one = integer_plus(context, builder, row, sig.args[1], d)
+            put_lanes(builder, part, element(context, builder, sig.args[0], array, one, k), a.dtype)
         return context.get_dummy_value()
 
     return types.void(array, row, k, a), generate
