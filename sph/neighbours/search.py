@@ -21,7 +21,7 @@ GROWTH = 0.05
 BUILD_OVER_PASSES = 0.3
 COPYING = 0.12
 
-# Extent of the region of a list in support diameters: a superblock of 128 particles and H around it.
+# Extent of the region of a list in support diameters: a superblock and H around it.
 WIDTH = 1.8
 
 # Share of superblocks above which all lists are built again instead of those that asked.

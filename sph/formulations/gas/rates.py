@@ -19,6 +19,7 @@ from sph.passes.gather import (
     largest_of,
     load_of,
     longest_list,
+    middle,
     near_blocks,
     near_particles,
     own_box,
@@ -85,7 +86,7 @@ def rates(
     for superblock in range(first, last):
         begin, end = lists.first[superblock], lists.first[superblock + 1]
         i_0, i_end = begin * BLOCK, min(end * BLOCK, mass.size)
-        x_0, v_0 = at(dim, position, i_0), at(dim, velocity, i_0)
+        x_0, v_0 = middle(dim, neighbours, begin, end), at(dim, velocity, i_0)
         per_length = unit(largest_of(support, i_0, i_end))
         per_velocity = unit(largest_of(sound_speed, i_0, i_end))
         per_mass = unit(largest_of(mass, i_0, i_end))
