@@ -96,6 +96,15 @@ def test_operations_of_different_widths_are_refused():
 # --- memory ---
 
 
+@pytest.mark.parametrize("call", ["load(DOUBLE, a, (0, 0))", "at((0, 0), a, 0)"])
+def test_arrays_in_another_order_are_refused(call):
+    run = compiled(f"def run(a):\n    {call}")
+    run(np.zeros((2, 8)))
+    for a in (np.zeros((2, 8), order="F"), np.zeros((2, 16))[:, ::2]):
+        with pytest.raises(Exception, match="expected an array in C order"):
+            run(a)
+
+
 @every_lanes
 def test_loads_and_stores_at_any_place(lanes):
     run = compiled(
