@@ -23,7 +23,7 @@ def predict(state: State, evolved: tuple[Evolved, ...], dt: float, team: Team = 
     """
     s, n, given = state, state.mass.size, 0.0
     moved = s.position, s.velocity, s.acceleration, s.predicted_velocity
-    team.chunks(_move, n, dt, *moved)
+    team.chunks(move, n, dt, *moved)
     for one in evolved:
         value, rate, predicted = map(s.rows, (one.value, one.rate, one.predicted))
         given += sum(team.chunks(one.rule.predict, n, dt, value, rate, s.mass, predicted))
@@ -33,7 +33,7 @@ def predict(state: State, evolved: tuple[Evolved, ...], dt: float, team: Team = 
 def correct(state: State, evolved: tuple[Evolved, ...], dt: float, team: Team = ALONE) -> float:
     """Advance by the second half step with the new rates. Return the energy added beyond these."""
     s, n, given = state, state.mass.size, 0.0
-    team.chunks(_straight_correct, n, dt, s.velocity, s.acceleration, s.mass)
+    team.chunks(straight_correct, n, dt, s.velocity, s.acceleration, s.mass)
     for one in evolved:
         value, rate = s.rows(one.value), s.rows(one.rate)
         given += sum(team.chunks(one.rule.correct, n, dt, value, rate, s.mass))
@@ -56,7 +56,7 @@ ROUNDED = COMPILED | {"fastmath": FASTMATH - {"contract"}}
 
 
 @njit(**COMPILED)
-def _move(first, last, dt, position, velocity, acceleration, velocity_full):
+def move(first, last, dt, position, velocity, acceleration, velocity_full):
     """Advance positions by a full step (eq 1) and velocities by half a step (eq 2).
 
     velocity_full receives the full-step prediction (eq 4).
@@ -82,7 +82,7 @@ def _straight_predict(first, last, dt, value, rate, mass, value_full) -> float:
 
 
 @njit(**COMPILED)
-def _straight_correct(first, last, dt, value, rate, mass) -> float:
+def straight_correct(first, last, dt, value, rate, mass) -> float:
     """Advance `value` by the second half step with the new rate (eqs 29 and 31)."""
     for d in range(value.shape[0]):
         for i in range(np.uint64(first), np.uint64(last)):
@@ -145,5 +145,5 @@ def _kept_positive(energy, change):
     return energy + change, 0.0
 
 
-STRAIGHT = Rule(_straight_predict, _straight_correct)
+STRAIGHT = Rule(_straight_predict, straight_correct)
 POSITIVE = Rule(_positive_predict, _positive_correct)

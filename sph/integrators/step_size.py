@@ -82,7 +82,7 @@ class Past(NamedTuple):
 
 
 @njit(**COMPILED)
-def _smallest(
+def smallest(
     first, last, support, signal_speed, energy, energy_rate, acceleration, identity, energy_limit
 ):  # fmt: skip
     """Return the smallest limit but for the Courant number, the particle's ID, the criterion."""
@@ -119,7 +119,7 @@ def _smallest(
 
 
 @njit(**COMPILED)
-def _largest_change(first, last, support, before, identity):
+def largest_change(first, last, support, before, identity):
     """Return the largest relative change of H in either direction, and the particle's ID."""
     largest = 0.0
     particle = 0
@@ -131,7 +131,7 @@ def _largest_change(first, last, support, before, identity):
 
 
 @njit(**COMPILED)
-def _fastest_change(first, last, divergence, identity):
+def fastest_change(first, last, divergence, identity):
     """Return the largest |div v|, and the particle's ID."""
     largest = 0.0
     particle = 0
@@ -148,7 +148,7 @@ def limit(
     """Return the next step; past: None at the start."""
     s = state
     dt, particle, index = min(team.chunks(
-        _smallest, s.support.size, s.support, s.signal_speed, s.internal_energy, s.energy_rate,
+        smallest, s.support.size, s.support, s.signal_speed, s.internal_energy, s.energy_rate,
         s.acceleration if bounds.acceleration else None, s.id, bounds.energy,
     ))  # fmt: skip
     dt, criterion = bounds.courant * dt, CRITERIA[index] if index else bounds.criterion
@@ -183,13 +183,13 @@ def _rate_of_supports(state: State, past: Past | None, team: Team) -> tuple[floa
     """Return the largest |dH/dt|/H, from div v if available, and the particle's ID."""
     divergence = state.get("div_v")
     if divergence is not None:
-        found = team.chunks(_fastest_change, divergence.size, divergence, state.id)
+        found = team.chunks(fastest_change, divergence.size, divergence, state.id)
         change, particle = _largest(found)
         return rate_of_supports(change, True, state.dimension, 0.0), particle
     if past is None:
         return 0.0, 0
     supports = state.support, state.support_before
-    found = team.chunks(_largest_change, state.support.size, *supports, state.id)
+    found = team.chunks(largest_change, state.support.size, *supports, state.id)
     change, particle = _largest(found)
     return rate_of_supports(change, False, state.dimension, past.dt), particle
 

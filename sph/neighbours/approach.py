@@ -38,7 +38,7 @@ def first_contact(
     support, that a pair starting close to the edge may reach. A step with relative motions above
     box_length is cut to that, with ID 0. Returns (1, 0) if no pair bounds the step.
     """
-    whole = _served(velocity, acceleration, support, images.sign, box_length, dt)
+    whole = served(velocity, acceleration, support, images.sign, box_length, dt)
     if not whole > 0.0:
         return 1.0, 0
     dt = whole * dt
@@ -53,7 +53,7 @@ def first_contact(
 
 
 @njit(**COMPILED)
-def _served(velocity, acceleration, support, sign, box_length, dt):
+def served(velocity, acceleration, support, sign, box_length, dt):
     """Return the fraction of dt for which images are valid; 0 if relative motions are small."""
     D, n = velocity.shape
     least = np.inf

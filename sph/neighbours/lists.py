@@ -18,7 +18,7 @@ from sph.neighbours.order import BLOCK
 from sph.neighbours.tree import Tree
 from sph.threads import SMALLEST_RANGE, Team
 
-SUPERBLOCK = 8  # blocks of a superblock, at most
+SUPERBLOCK = 16  # blocks of a superblock, at most
 CHUNK = 4  # superblocks that share a region of the storage
 IMAGE_SHIFT = 23  # low bits of an entry: the block; above them the image
 SHORT_IMAGES = 1 << (31 - IMAGE_SHIFT)  # with so many images an entry fits into 32 bits

@@ -21,6 +21,9 @@ GROWTH = 0.05
 BUILD_OVER_PASSES = 0.3
 COPYING = 0.12
 
+# Extent of the region of a list in support diameters: a superblock and H around it.
+WIDTH = 1.8
+
 # Share of superblocks above which all lists are built again instead of those that asked.
 MANY = 0.3
 
@@ -38,15 +41,15 @@ class Origin(NamedTuple):
 
 
 @njit(**COMPILED)
-def _motion(position, support, list_position, list_support, boxes):
-    """Return the largest |r - r_list| / H_list and the largest H / H_list.
+def motion(first, last, position, support, list_position, list_support, boxes):
+    """Return the largest |r - r_list| / H_list and the largest H / H_list of blocks [first, last).
 
     boxes (blocks, 2 D) receives the lower and upper corners of the box of each block.
     """
     D, n = position.shape
     moved = 0.0
     grown = 0.0
-    for block in range(boxes.shape[0]):
+    for block in range(first, last):
         a, b = block * BLOCK, min((block + 1) * BLOCK, n)
         for d in range(D):
             low = high = position[d, a]
@@ -64,11 +67,11 @@ def _motion(position, support, list_position, list_support, boxes):
 
 
 @njit(**COMPILED)
-def _largest_step(velocity, support, dt):
-    """Return the largest |v| dt / H."""
-    D, n = velocity.shape
+def _largest_step(first, last, velocity, support, dt):
+    """Return the largest |v| dt / H of particles [first, last)."""
+    D = velocity.shape[0]
     largest = 0.0
-    for i in range(n):
+    for i in range(first, last):
         squared = 0.0
         for d in range(D):
             squared += velocity[d, i] ** 2
@@ -80,12 +83,12 @@ def best_skin(step: float, dimension: int) -> float:
     """Return the skin with the lowest cost per step if particles move `step` supports in a step.
 
     Lists that serve k steps need a skin of GROWTH + 2 (k - 1) step. Each step then costs 1/k of a
-    build, and the number of listed blocks grows as (1 + skin)^D.
+    build, and the number of listed blocks grows as (1 + skin/WIDTH)^D.
     """
     least, steps = np.inf, 1
     for k in range(1, 21):
         skin = GROWTH + 2 * (k - 1) * step
-        cost = BUILD_OVER_PASSES / k + COPYING * (1 + skin) ** dimension
+        cost = BUILD_OVER_PASSES / k + COPYING * (1 + skin / WIDTH) ** dimension
         if not cost < least:  # the costs are convex in k
             break
         least, steps = cost, k
@@ -116,13 +119,18 @@ class Search:
         origin = self.origin
         if self.lists is None or origin is None:
             return True
-        moved, grown = _motion(position, support, origin.position, origin.support, self.boxes)
+        found = self.team.chunks(
+            motion, self.lists.first[-1], position, support, origin.position, origin.support,
+            self.boxes,
+        )  # fmt: skip
+        moved, grown = map(max, zip(*found, strict=True))
         self.reach_factor = 1.0 + origin.skin - 2.0 * moved
         return not self.reach_factor > grown
 
     def skin_for(self, velocity: np.ndarray, support: np.ndarray, dt: float) -> float:
         """Return the skin for lists built now, for velocity (D, N), support (N,) and step dt."""
-        return best_skin(_largest_step(velocity, support, dt), velocity.shape[0])
+        steps = self.team.chunks(_largest_step, support.size, velocity, support, dt)
+        return best_skin(max(steps), velocity.shape[0])
 
     def guess(self, position: np.ndarray, ratio: float) -> np.ndarray:
         """Supports (N,) to begin with, none so wide that lists cannot serve it."""
@@ -180,8 +188,10 @@ class Search:
         assert self.origin is not None
         assert self.lists is not None
         self._widenings += 1
-        asked = wanted > 1.0
-        factor = np.where(asked, wanted * (2.0 if self._widenings > PATIENCE else 1.0), 1.0)
+        asked = wanted > 0.0
+        # where particles have moved, lists reach less far than the supports they are built for
+        growth = (2.0 if self._widenings > PATIENCE else 1.0) / min(self.reach_factor, 1.0)
+        factor = np.where(asked, wanted * growth, 1.0)
         support = self.origin.support * np.repeat(factor, BLOCK)[: identity.size]
         origin = self.origin._replace(support=support)
         changed = self._check_reach(origin, identity)

@@ -111,11 +111,11 @@ def constant(kind, value):
     return ir.Constant(kind, value)
 
 
-def call(builder, name, kind: Vec, result, arguments, flags=FAST):
-    """Call the LLVM intrinsic `name` for vectors of a type."""
-    full = f"{name}.v{kind.width}{SHORT[kind.kind]}"
+def call(builder, name, kind, result, arguments, flags=FAST):
+    """Call the LLVM intrinsic `name` for numbers or vectors of a type."""
+    suffix = f"v{kind.width}{SHORT[kind.kind]}" if isinstance(kind, Vec) else SHORT[kind]
     function_type = ir.FunctionType(result, [argument.type for argument in arguments])
-    function = cgutils.get_or_insert_function(builder.module, function_type, full)
+    function = cgutils.get_or_insert_function(builder.module, function_type, f"{name}.{suffix}")
     return builder.call(function, arguments, fastmath=flags)
 
 

@@ -125,14 +125,15 @@ class Program:
 
     def _add_prediction(self) -> None:
         moved = self._of("position", "velocity", "acceleration", "predicted_velocity")
-        self._add(driver.NOTHING, leapfrog._move, *self._all, self._dt, *moved)
+        self._add(driver.NOTHING, leapfrog.move, *self._all, self._dt, *moved)
         (mass,) = self._of("mass")
         for one in self._simulation.evolved:
             value, rate, predicted = self._rows(one.value, one.rate, one.predicted)
             arrays = value, rate, mass, predicted
             self._add(driver.GIVES, one.rule.predict, *self._all, self._dt, *arrays)
         lists = self._of("position", "support", "list_position", "list_support", "boxes")
-        self._add(driver.MOVES, search._motion, *lists, phase=LEAPFROG)
+        blocks = self._simulation.sweep.wanted.size
+        self._add(driver.MOVES, search.motion, 0, blocks, *lists, phase=LEAPFROG)
 
     def _add_pass(self, one: Pass, lists: Held) -> None:
         s = self._simulation
@@ -151,7 +152,7 @@ class Program:
 
     def _add_correction(self) -> None:
         (mass,) = self._of("mass")
-        rules = [("velocity", "acceleration", leapfrog._straight_correct)]
+        rules = [("velocity", "acceleration", leapfrog.straight_correct)]
         rules += [(one.value, one.rate, one.rule.correct) for one in self._simulation.evolved]
         for value, rate, rule in rules:
             arrays = *self._rows(value, rate), mass
@@ -167,18 +168,18 @@ class Program:
             self.momentum,
         )  # fmt: skip
         self._add(
-            driver.BOUNDS, step_size._smallest, *self._all,
+            driver.BOUNDS, step_size.smallest, *self._all,
             *of("support", "signal_speed", "internal_energy", "energy_rate"),
             *of("acceleration" if bounds.acceleration else None, "id"), bounds.energy,
         )  # fmt: skip
         if "div_v" in self._held:
             arrays = of("div_v", "id")
-            self._add(driver.DIVERGES, step_size._fastest_change, *self._all, *arrays)
+            self._add(driver.DIVERGES, step_size.fastest_change, *self._all, *arrays)
         else:
             arrays = of("support", "support_before", "id")
-            self._add(driver.CHANGES, step_size._largest_change, *self._all, *arrays)
+            self._add(driver.CHANGES, step_size.largest_change, *self._all, *arrays)
         self._add(
-            driver.MEETS, approach._served, *of("velocity", "acceleration", "support"),
+            driver.MEETS, approach.served, *of("velocity", "acceleration", "support"),
             domain.images.sign, domain.longest_reach, Held("next_dt", 0.0), phase=SUMS,
         )  # fmt: skip
         if self._fences.size:

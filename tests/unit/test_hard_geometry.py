@@ -214,12 +214,13 @@ def test_wide_first_guess_without_trimming_lists_everything(begin, monkeypatch):
     monkeypatch.setattr(first_guess, "from_spacing", lambda *a: 100.0 * guess(*a))
 
     def listed():
+        """Mean number of blocks in a list, of 250."""
         return begin(places, "open").search.lists.count.mean()
 
-    # 30 particles to a support, up to eight times as many where it is left as it is
-    assert listed() < 2 * 8 * 30
+    # 56; 32 with supports that have 30 neighbours: trimmed supports have up to 8 times as many
+    assert listed() < 75
     monkeypatch.setattr(first_guess, "trim", lambda *a: None)
-    assert listed() > 0.9 * 2000  # but for those that are farther apart than the domain is wide
+    assert listed() > 0.9 * 250  # but for those that are farther apart than the domain is wide
 
 
 @pytest.mark.parametrize("count", [1, 2])
@@ -250,9 +251,11 @@ def test_counted_passes_at_mass_jump_diverge_without_solver(begin):
         )
         (density,) = (one for one in simulation.scene.passes if one.stage == "density")
         solved = simulation.particles.support.copy()  # the start's are
+        found = []
         for _ in range(20):  # nothing moves: a support that is found stays
             simulation._make(density)
-        return np.max(np.abs(np.log(simulation.particles.support / solved)))
+            found.append(np.max(np.abs(np.log(simulation.particles.support / solved))))
+        return max(found)  # what diverges swings to and fro
 
     assert farthest(UNSETTLED) < UNSETTLED
-    assert farthest(np.inf) > 1.0  # a support six times too wide or narrow
+    assert farthest(np.inf) > 1.0  # a support three times too wide or narrow

@@ -75,14 +75,14 @@ def test_unphysical_value_names_particle(begin, name, value, words):
     assert caught.value.particle == simulation.particles.id[7]
 
 
-def test_nan_without_guard_is_not_detected(begin, monkeypatch):
+def test_nan_without_guard_gives_misleading_error(begin, monkeypatch):
     for guard in ("_check_numbers", "_check_energy"):  # a drift that is not a number is one, too
         monkeypatch.setattr(watchdog.Watchdog, guard, lambda *_: None)
     simulation = begin()
     simulation.particles.velocity[0, 7] = np.nan
-    for _ in range(2):
+    # a particle without a position has no neighbour, however wide its support
+    with pytest.raises(NumericalError, match="needs a support radius of inf"):
         simulation.advance(math.inf)
-    assert np.isnan(simulation.totals.energy)
 
 
 def test_energy_from_nowhere_stops_run(begin, monkeypatch):
@@ -521,5 +521,5 @@ def test_run_far_too_slow_to_finish_stops(begin, monkeypatch):
 
 def test_extreme_values_without_range_check_give_misleading_error(begin, monkeypatch):
     monkeypatch.setattr(watchdog.Watchdog, "check_range", lambda *_: None)
-    with pytest.raises(NumericalError, match="no support radius contains enough neighbours"):
+    with pytest.raises(NumericalError, match=r"density of particle 1 .* is 0\.0"):
         begin("problem.velocities=[[0.0],[1e155],[0.0],[0.0]]", text=CLOUD)
