@@ -37,6 +37,8 @@ INLINED: dict[str, Any] = {**FLAGS, **_NO_C, "forceinline": True, "no_cpython_wr
 
 Verb = TypeVar("Verb", bound=Callable[..., Any])
 
+VERBS: dict[str, Any] = {}  # every verb, by name
+
 
 def verb(stub: Verb) -> Verb:
     """Make `stub(model, ...)` resolve at compile time to that method of the model's class.
@@ -44,6 +46,9 @@ def verb(stub: Verb) -> Verb:
     A model (kernel, equation of state, viscosity) is a NamedTuple whose methods are its formulas:
     called from Python they work on NumPy arrays, called from compiled code they are inlined.
     The method's parameters must have the stub's names. A new model needs only a new class.
+
+    Pair loops call the methods with vectors (`sph.simd`), unless `takes_vectors` of the verb is set
+    to False.
     """
     name = stub.__name__
     parameters = list(inspect.signature(stub).parameters)
@@ -57,6 +62,8 @@ def verb(stub: Verb) -> Verb:
     found = eval(source, {"pick": pick})
     overload(stub, jit_options=INLINED)(found)  # type: ignore[arg-type]
     stub.verb_parameters = parameters  # type: ignore[attr-defined]
+    stub.takes_vectors = True  # type: ignore[attr-defined]
+    VERBS[name] = stub
     return stub
 
 
@@ -68,17 +75,22 @@ def _fast_binary(llvm_name: str):
 
     @intrinsic
     def operation(typingctx, a, b):
-        if not (isinstance(a, types.Float) and a == b):
+        common = typingctx.unify_types(a, b)
+        if not isinstance(common, types.Float):
             return None
 
         def generate(context, builder, signature, arguments):
+            arguments = [
+                context.cast(builder, value, given, common)
+                for value, given in zip(arguments, signature.args, strict=True)
+            ]
             kind = arguments[0].type
             function = builder.module.declare_intrinsic(
                 llvm_name, [kind], ir.FunctionType(kind, [kind, kind])
             )
             return builder.call(function, arguments, fastmath=("fast",))
 
-        return a(a, b), generate
+        return common(a, b), generate
 
     return operation
 
@@ -88,20 +100,24 @@ _minnum = _fast_binary("llvm.minnum")
 
 
 def larger(a, b):
-    """The larger of two numbers of the same type (undefined for NaN), or elementwise in NumPy."""
+    """The larger of two numbers (undefined for NaN), or elementwise in NumPy."""
     return np.maximum(a, b)
 
 
 def smaller(a, b):
-    """The smaller of two numbers of the same type (undefined for NaN), or elementwise in NumPy."""
+    """The smaller of two numbers (undefined for NaN), or elementwise in NumPy."""
     return np.minimum(a, b)
+
+
+def _are_numbers(*kinds):
+    return all(isinstance(one, types.Number | types.Boolean) for one in kinds)
 
 
 @overload(larger, jit_options=FLAGS)  # type: ignore[arg-type]
 def _larger(a, b):
-    return lambda a, b: _maxnum(a, b)
+    return (lambda a, b: _maxnum(a, b)) if _are_numbers(a, b) else None
 
 
 @overload(smaller, jit_options=FLAGS)  # type: ignore[arg-type]
 def _smaller(a, b):
-    return lambda a, b: _minnum(a, b)
+    return (lambda a, b: _minnum(a, b)) if _are_numbers(a, b) else None
