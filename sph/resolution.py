@@ -16,6 +16,7 @@ gap/c:
 | 1e-1  | 2e-2 ... 1e-1 | 6e-2 ... 4e-1 | 2e-1         | 3e-1   | 8e-1             |
 """
 
+import functools
 from typing import NamedTuple
 
 import numpy as np
@@ -47,19 +48,29 @@ def largest_gap(particles, spacing, sound_speed) -> Gap:
     A velocity is compared with c + |v - median of v|. So gas in uniform motion at Mach 1e17 is not
     resolved, but cold streams that collide at that speed are.
     """
-    departure = particles.velocity - np.median(particles.velocity, axis=1, keepdims=True)
-    scales = {
-        "position": np.broadcast_to(spacing, particles.mass.shape),
-        "velocity": sound_speed + np.linalg.norm(departure, axis=0),
-    }
-    gaps = []
-    for kind, scale in scales.items():
-        size = np.spacing(np.abs(getattr(particles, kind)).max(axis=0))
-        # pressureless gas at rest has scale 0 and needs no check; the watchdog reports NaN
-        ratio = np.divide(size, scale, out=np.zeros_like(size), where=scale > 0.0)
-        i = int(np.argmax(np.nan_to_num(ratio, nan=0.0)))
-        gaps.append(Gap(kind, i, float(size[i]), float(scale[i])))
+    spacing = np.broadcast_to(spacing, particles.mass.shape)
+    gaps = [
+        _largest("position", particles.position, spacing),
+        _largest("velocity", particles.velocity, _departure(particles.velocity) + sound_speed),
+    ]
     return max(gaps, key=lambda gap: gap.size / gap.scale if gap.scale > 0.0 else 0.0)
+
+
+# The next two work axis by axis and in place: the arrays of a large run leave little memory.
+
+
+def _departure(velocity: np.ndarray) -> np.ndarray:
+    """Return |v - median of v|, (N,), of velocities (D, N)."""
+    return np.sqrt(sum((v - np.median(v)) ** 2 for v in velocity))
+
+
+def _largest(kind: str, values: np.ndarray, scale: np.ndarray) -> Gap:
+    """Return the largest gap of values (D, N) over scale (N,)."""
+    size = np.spacing(functools.reduce(np.maximum, map(np.abs, values)))
+    # pressureless gas at rest has scale 0 and needs no check; the watchdog reports NaN
+    ratio = np.divide(size, scale, out=np.zeros_like(size), where=scale > 0.0)
+    i = int(np.argmax(np.nan_to_num(ratio, copy=False, nan=0.0)))
+    return Gap(kind, i, float(size[i]), float(scale[i]))
 
 
 def check_extent(simulation) -> None:
@@ -94,7 +105,8 @@ def _gap_of(simulation) -> Gap:
         sound_speed = eos.sound_speed(p.density, eos.pressure(p.density, p.internal_energy))
     spacing = p.support / (models.support_ratio * models.eta)
     # a density below 0 marks a particle without a support radius, which is reported elsewhere
-    return largest_gap(p, np.where(p.density > 0.0, spacing, np.inf), sound_speed)
+    spacing[~(p.density > 0.0)] = np.inf
+    return largest_gap(p, spacing, sound_speed)
 
 
 def _refuse(simulation, gap: Gap) -> None:

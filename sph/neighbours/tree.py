@@ -61,23 +61,3 @@ def build(position: np.ndarray, support: np.ndarray) -> Tree:
                 upper[k, d] = max(upper[left, d], upper[right, d])
             largest[k] = max(largest[left], largest[right])
     return Tree(first, last, lower, upper, largest)
-
-
-@njit(**COMPILED)
-def raise_support(tree: Tree, leaves: np.ndarray, which: np.ndarray, support: np.ndarray) -> None:
-    """Raise the largest support radii of nodes to those of the blocks `which`, in place.
-
-    leaves (blocks,): node of each block; support: (N,).
-    """
-    for block in range(leaves.size):
-        if not which[block]:
-            continue
-        largest = 0.0
-        for p in range(block * BLOCK, min((block + 1) * BLOCK, support.size)):
-            largest = max(largest, support[p])
-        node = leaves[block]
-        while tree.support[node] < largest:
-            tree.support[node] = largest
-            if node == 0:
-                break
-            node = (node - 1) // 2
