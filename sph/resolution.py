@@ -1,4 +1,4 @@
-"""Check that float64 resolves positions and velocities, and float32 positions in single precision.
+"""Check that float64, in single precision float32, resolves positions and velocities.
 
 The gap between a float64 number and the next grows with the number (`np.spacing`). Far from 0 it
 becomes a noticeable fraction of the particle spacing, and in fast bulk motion of the speed of
