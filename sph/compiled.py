@@ -7,9 +7,11 @@ from typing import Any, TypeVar
 import numpy as np
 from llvmlite import ir
 from numba import types
-from numba.extending import intrinsic, overload
+from numba.core.typing.templates import AbstractTemplate, infer_global, signature
+from numba.extending import lower_builtin, overload
 
 from sph import compile_cache
+from sph.lean_compiler import Lean
 
 compile_cache.install()
 
@@ -19,20 +21,20 @@ FASTMATH = {"nsz", "arcp", "contract", "afn", "reassoc"}
 # NumPy's error model: with Python's check for division by zero no loop would vectorise.
 FLAGS: dict[str, Any] = {"fastmath": FASTMATH, "error_model": "numpy"}
 
-# Without this, Numba adds to each function a wrapper for callers from C. There are none.
-_NO_C: dict[str, Any] = {"no_cfunc_wrapper": True}
+# Numba adds to each function a wrapper for callers from C. There are none.
+_LEAN: dict[str, Any] = {"no_cfunc_wrapper": True, "pipeline_class": Lean}
 
 # Options of every compiled function: @njit(**COMPILED). None is compiled with parallel=True: passes
 # release the interpreter's lock and run over ranges of blocks on Python threads (sph/threads.py),
 # which costs no second compilation and takes nested models.
-COMPILED: dict[str, Any] = {"cache": True, "nogil": True, **FLAGS, **_NO_C}
+COMPILED: dict[str, Any] = {"cache": True, "nogil": True, **FLAGS, **_LEAN}
 
 
 # For functions with floating-point sums that other compiled functions call. A function that is not
 # inlined exists in two compiled copies, which may round differently: the process that compiles the
 # caller uses one copy, and a process that finds the caller in the cache uses the other. Python
 # cannot call them: the wrapper for that would hold the code a second time.
-INLINED: dict[str, Any] = {**FLAGS, **_NO_C, "forceinline": True, "no_cpython_wrapper": True}
+INLINED: dict[str, Any] = {**FLAGS, **_LEAN, "forceinline": True, "no_cpython_wrapper": True}
 
 
 Verb = TypeVar("Verb", bound=Callable[..., Any])
@@ -60,33 +62,6 @@ def verb(stub: Verb) -> Verb:
     return stub
 
 
-def _fast_binary(llvm_name: str):
-    """An intrinsic for llvm.maxnum or llvm.minnum with all fast flags.
-
-    Python's max() carries rules for NaN that stop LLVM from vectorising a reduction over it.
-    """
-
-    @intrinsic
-    def operation(typingctx, a, b):
-        if not (isinstance(a, types.Float) and a == b):
-            return None
-
-        def generate(context, builder, signature, arguments):
-            kind = arguments[0].type
-            function = builder.module.declare_intrinsic(
-                llvm_name, [kind], ir.FunctionType(kind, [kind, kind])
-            )
-            return builder.call(function, arguments, fastmath=("fast",))
-
-        return a(a, b), generate
-
-    return operation
-
-
-_maxnum = _fast_binary("llvm.maxnum")
-_minnum = _fast_binary("llvm.minnum")
-
-
 def larger(a, b):
     """The larger of two numbers of the same type (undefined for NaN), or elementwise in NumPy."""
     return np.maximum(a, b)
@@ -97,11 +72,28 @@ def smaller(a, b):
     return np.minimum(a, b)
 
 
-@overload(larger, jit_options=FLAGS)  # type: ignore[arg-type]
-def _larger(a, b):
-    return lambda a, b: _maxnum(a, b)
+def _extremum(function, llvm_name):
+    """Define function(a, b) of two numbers by llvm.maxnum or llvm.minnum, with all fast flags.
+
+    Python's max() carries rules for NaN that stop LLVM from vectorising a reduction over it.
+    """
+
+    @infer_global(function)
+    class Typed(AbstractTemplate):
+        def generic(self, arguments, keywords):
+            if len(arguments) == 2 and not keywords and arguments[0] == arguments[1]:
+                if isinstance(arguments[0], types.Float):
+                    return signature(arguments[0], *arguments)
+            return None
+
+    @lower_builtin(function, types.Float, types.Float)
+    def lower(context, builder, sig, arguments):
+        kind = arguments[0].type
+        of_two = builder.module.declare_intrinsic(
+            llvm_name, [kind], ir.FunctionType(kind, [kind, kind])
+        )
+        return builder.call(of_two, arguments, fastmath=("fast",))
 
 
-@overload(smaller, jit_options=FLAGS)  # type: ignore[arg-type]
-def _smaller(a, b):
-    return lambda a, b: _minnum(a, b)
+_extremum(larger, "llvm.maxnum")
+_extremum(smaller, "llvm.minnum")
