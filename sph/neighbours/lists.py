@@ -35,10 +35,9 @@ class Lists(NamedTuple):
 
 
 @njit(**COMPILED)
-def superblocks(tree: Tree) -> np.ndarray:
-    """Return the first block of each superblock, in order, and the number of blocks."""
+def _superblocks(tree: Tree, found: np.ndarray) -> int:
+    """Write the first block of each superblock, in order, to `found`; return how many there are."""
     first, last = tree.first, tree.last
-    found = np.empty(last[0] + 1, np.int64)
     stack = np.empty(128, np.int64)
     stack[0] = 0
     depth, number = 1, 0
@@ -52,8 +51,14 @@ def superblocks(tree: Tree) -> np.ndarray:
             stack[depth] = 2 * node + 2
             stack[depth + 1] = 2 * node + 1
             depth += 2
-    found[number] = last[0]
-    return found[: number + 1].copy()
+    return number
+
+
+def superblocks(tree: Tree) -> np.ndarray:
+    """Return the first block of each superblock, in order, and the number of blocks."""
+    blocks = tree.last[0]
+    found = np.empty(blocks, np.int64)
+    return np.append(found[: _superblocks(tree, found)], blocks)
 
 
 @njit(**INLINED)

@@ -28,11 +28,13 @@ def build(position: np.ndarray, support: np.ndarray) -> Tree:
     while (1 << depth) < blocks:
         depth += 1
     nodes = (1 << (depth + 1)) - 1
-    first = np.full(nodes, -1)
-    last = np.full(nodes, -1)
+    first = np.empty(nodes, np.int64)
+    last = np.empty(nodes, np.int64)
     lower = np.empty((nodes, D))
     upper = np.empty((nodes, D))
     largest = np.empty(nodes)
+    for k in range(nodes):  # not np.full, which takes longer to compile
+        first[k], last[k] = -1, -1
     first[0], last[0] = 0, blocks
     for k in range(nodes):
         if last[k] - first[k] > 1:

@@ -1,15 +1,14 @@
 """Reading and writing of lanes, and scratch arrays."""
 
-import numpy as np
 from llvmlite import ir
 from numba import types
 from numba.core import cgutils
-from numba.extending import overload
+from numba.np.arrayobj import make_array, populate_array
 
-from sph.compiled import INLINED
 from sph.simd.types import (
     I32,
     I64,
+    KINDS,
     Vec,
     in_every_lane,
     instruction,
@@ -161,27 +160,30 @@ def first_lanes(builder, number, width):
 
 
 @instruction
-def _location(typing_context, array):
+def rows(typing_context, lanes, number, length):
+    """Return an array (number, length) in the precision of `lanes`, aligned to cache lines.
+
+    Raises MemoryError. This is np.empty in a few instructions, which compiles in no time.
+    """
+    kind = types.Array(lanes.instance_class.kind, 2, "C")
+
     def generate(context, builder, sig, arguments):
-        view = context.make_array(sig.args[0])(context, builder, arguments[0])
-        return builder.ptrtoint(view.data, I64)
+        shape = [
+            context.cast(builder, value, given, types.intp)
+            for value, given in zip(arguments[1:], sig.args[1:], strict=True)
+        ]
+        item = context.get_constant(types.intp, kind.dtype.bitwidth // 8)
+        stride = builder.mul(item, shape[1])
+        size = builder.mul(stride, shape[0])
+        block = context.nrt.meminfo_alloc_aligned(builder, size, CACHE_LINE)
+        array = make_array(kind)(context, builder)
+        populate_array(
+            array,
+            data=builder.bitcast(
+                context.nrt.meminfo_data(builder, block), KINDS[kind.dtype].as_pointer()
+            ),
+            shape=shape, strides=[stride, item], itemsize=item, meminfo=block,
+        )  # fmt: skip
+        return array._getvalue()
 
-    return types.int64(array), generate
-
-
-def rows(lanes, number, length):
-    """Return an array (number, length) in the precision of `lanes`, aligned to cache lines."""
-
-
-@overload(rows, jit_options=INLINED)  # type: ignore[arg-type]
-def _rows(lanes, number, length):
-    kind = np.float32 if lanes.instance_class.kind == types.float32 else np.float64
-    size = np.dtype(kind).itemsize
-    line = CACHE_LINE // size
-
-    def make(lanes, number, length):
-        whole = np.empty(number * length + line, kind)
-        begin = (-_location(whole) % CACHE_LINE) // size
-        return whole[begin : begin + number * length].reshape(number, length)
-
-    return make
+    return kind(lanes, number, length), generate

@@ -80,12 +80,12 @@ def density(
     weighting, lists = models.weighting, neighbours.lists
     # position, weight, velocity, m u; Numba does not know (*dim, 0)
     fields = also(also(dim + (0,), div_v, dim), energy_shift, (0,))  # noqa: RUF005
-    copied, near, boxes, chosen = scratch(lanes, dim, longest_list(first, last, lists), fields)
+    copied, near, boxes, chosen = scratch(lanes, dim, longest_list(first, last, lists), len(fields))
     pairs = rows(lanes, CURL + 3, near.shape[1])
     settled = np.empty(BLOCK, np.bool_)
     for superblock in range(first, last):
         begin, end = lists.first[superblock], lists.first[superblock + 1]
-        if not wanted[begin:end].any():
+        if not largest_of(wanted, begin, end) > 0.0:
             continue
         i_0, i_end = begin * BLOCK, min(end * BLOCK, mass.size)
         x_0, v_0 = at(dim, position, i_0), at(dim, velocity, i_0)

@@ -80,7 +80,7 @@ def rates(
     every = also(with_share, energy_shift, (0,))
     a_row, f_row, u_row = len(fields), len(with_alpha), len(with_f)
     share_row, shift_row = len(with_u), len(with_share)
-    copied, near, boxes, chosen = scratch(lanes, dim, longest_list(first, last, lists), every)
+    copied, near, boxes, chosen = scratch(lanes, dim, longest_list(first, last, lists), len(every))
     used = np.empty(near.shape[1] // width(lanes), np.int64)
     for superblock in range(first, last):
         begin, end = lists.first[superblock], lists.first[superblock + 1]

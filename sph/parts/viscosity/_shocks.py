@@ -111,7 +111,7 @@ def shocks(
     # rows of candidates: position, velocity, acceleration, weight, its sign, c/2
     m_row, signed_row, c_row = 3 * D, 3 * D + 1, 3 * D + 2
     fields = dim + dim + dim + (0, 0, 0)
-    copied, near, boxes, chosen = scratch(lanes, dim, longest_list(first, last, lists), fields)
+    copied, near, boxes, chosen = scratch(lanes, dim, longest_list(first, last, lists), len(fields))
     # rows of neighbours: r_ij/H, g r_ij/H, v_ij, a_ij
     pairs = rows(lanes, 4 * D, near.shape[1])
     matrix = np.empty((D, D))
