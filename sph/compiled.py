@@ -10,10 +10,11 @@ from numba import types
 from numba.core.typing.templates import AbstractTemplate, infer_global, signature
 from numba.extending import lower_builtin, overload
 
-from sph import compile_cache
+from sph import compile_cache, lean_compiler
 from sph.lean_compiler import Lean
 
 compile_cache.install()
+lean_compiler.install()
 
 # Without "nnan" and "ninf": those would let the compiler remove every test for a non-finite number.
 FASTMATH = {"nsz", "arcp", "contract", "afn", "reassoc"}
