@@ -81,12 +81,15 @@ def report(sources, field, norm, cost, by, reference, directory):
 @click.option("--only", multiple=True, metavar="NAME",
               help="Run only this case, or the cases that match a pattern such as 'noh_*'. "
               "`sph list` names the cases. May be repeated.")  # fmt: skip
+@click.option("--set", "overrides", multiple=True, metavar="KEY=VALUE",
+              help="Set a key of the configuration for all cases, such as run.precision=single. "
+              "Keys that a setting of a case sets keep their values. May be repeated.")  # fmt: skip
 @click.option("-o", "directory", type=click.Path(path_type=Path), metavar="DIR",
               default=Path("runs/stress"), show_default=True,
               help="Directory of the runs.")  # fmt: skip
 @click.option("--jobs", type=click.IntRange(min=1), metavar="N",
               help="Number of runs at once. Default: number of processors.")  # fmt: skip
-def stress(only, directory, jobs):
+def stress(only, overrides, directory, jobs):
     """Run difficult test cases and check their results.
 
     A case has several settings. Some settings are known not to work (expected
@@ -95,7 +98,7 @@ def stress(only, directory, jobs):
     """
     from sph.stress import command, table
 
-    suite, results = command.run(only, directory, jobs)
+    suite, results = command.run(only, directory, jobs, overrides)
     click.echo(table.as_text(results))
     for sentence in table.sentences(suite.cases, results):
         click.echo(sentence)

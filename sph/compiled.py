@@ -40,6 +40,8 @@ INLINED: dict[str, Any] = {**FLAGS, **_LEAN, "forceinline": True, "no_cpython_wr
 
 Verb = TypeVar("Verb", bound=Callable[..., Any])
 
+VERBS: dict[str, Any] = {}  # every verb, by name
+
 
 def verb(stub: Verb) -> Verb:
     """Make `stub(model, ...)` resolve at compile time to that method of the model's class.
@@ -47,6 +49,9 @@ def verb(stub: Verb) -> Verb:
     A model (kernel, equation of state, viscosity) is a NamedTuple whose methods are its formulas:
     called from Python they work on NumPy arrays, called from compiled code they are inlined.
     The method's parameters must have the stub's names. A new model needs only a new class.
+
+    Pair loops call the methods with vectors (`sph.simd`), unless `takes_vectors` of the verb is set
+    to False.
     """
     name = stub.__name__
     parameters = list(inspect.signature(stub).parameters)
@@ -60,16 +65,18 @@ def verb(stub: Verb) -> Verb:
     found = eval(source, {"pick": pick})
     overload(stub, jit_options=INLINED)(found)  # type: ignore[arg-type]
     stub.verb_parameters = parameters  # type: ignore[attr-defined]
+    stub.takes_vectors = True  # type: ignore[attr-defined]
+    VERBS[name] = stub
     return stub
 
 
 def larger(a, b):
-    """The larger of two numbers of the same type (undefined for NaN), or elementwise in NumPy."""
+    """The larger of two numbers (undefined for NaN), or elementwise in NumPy."""
     return np.maximum(a, b)
 
 
 def smaller(a, b):
-    """The smaller of two numbers of the same type (undefined for NaN), or elementwise in NumPy."""
+    """The smaller of two numbers (undefined for NaN), or elementwise in NumPy."""
     return np.minimum(a, b)
 
 
@@ -82,9 +89,10 @@ def _extremum(function, llvm_name):
     @infer_global(function)
     class Typed(AbstractTemplate):
         def generic(self, arguments, keywords):
-            if len(arguments) == 2 and not keywords and arguments[0] == arguments[1]:
-                if isinstance(arguments[0], types.Float):
-                    return signature(arguments[0], *arguments)
+            numbers = [one for one in arguments if isinstance(one, types.Number | types.Boolean)]
+            if len(arguments) == len(numbers) == 2 and not keywords:
+                kind = self.context.unify_types(*numbers)
+                return signature(kind, kind, kind) if isinstance(kind, types.Float) else None
             return None
 
     @lower_builtin(function, types.Float, types.Float)

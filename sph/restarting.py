@@ -70,7 +70,7 @@ def restart(
             checkpoint, config=config, lineage=lineage, next_step=next_step,
             budget=_budget(checkpoint, target),
         )  # fmt: skip
-        _begin_anew(target, number, begun, any(not one.key.startswith("run.") for one in changed))
+        _begin_anew(target, number, begun, config.recorded != checkpoint.config.recorded)
         simulation = _resumed(begun, clock)
         if target.history.exists():
             history = History.resume(target.history, checkpoint.step)

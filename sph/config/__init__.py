@@ -12,7 +12,7 @@ from sph import registry
 from sph.config import commented, reading
 from sph.config.errors import suggestion
 from sph.config.physics import Physics
-from sph.config.sections import SECTIONS, Output, Report, Run, Time
+from sph.config.sections import RESOURCES, SECTIONS, Output, Report, Run, Time
 from sph.config.toml_text import key_text, value_text
 from sph.errors import ConfigError
 from sph.problems.base import Problem
@@ -29,17 +29,17 @@ class Config:
     report: Report
     run: Run
 
-    def to_toml(self, include_run: bool = True) -> str:
+    def to_toml(self) -> str:
         """Return all keys in declared order as TOML that reads back to an equal configuration."""
-        tables = _tables(self)
-        if not include_run:
-            del tables["run"]
-        return "\n".join(_table_text(name, keys) for name, keys in tables.items())
+        return _text(_tables(self))
 
     @functools.cached_property
     def recorded(self) -> str:
-        """The TOML text that checkpoints keep: all keys but those of [run]."""
-        return self.to_toml(include_run=False)
+        """The TOML text that checkpoints keep: all keys but RESOURCES, which change no result."""
+        tables = _tables(self)
+        for key in RESOURCES:
+            del tables["run"][key]
+        return _text(tables)
 
     def override(self, overrides: Sequence[str]) -> "Config":
         """Return a copy with the overrides `a.b=VALUE` applied. Raises ConfigError."""
@@ -87,6 +87,10 @@ def _tables(config: Config) -> dict[str, dict[str, Any]]:
     sections: dict[str, BaseModel] = {name: getattr(config, name) for name in _names()}
     # TOML cannot express None, the value of a key that is not set (gamma if eos is given).
     return {name: section.model_dump(exclude_none=True) for name, section in sections.items()}
+
+
+def _text(tables: dict[str, dict[str, Any]]) -> str:
+    return "\n".join(_table_text(name, keys) for name, keys in tables.items())
 
 
 def _table_text(name: str, keys: dict[str, Any]) -> str:

@@ -5,7 +5,7 @@ from typing import Annotated, ClassVar, Literal
 
 from pydantic import AfterValidator, Field
 
-from sph.config.restarts import RECORDED
+from sph.config.restarts import FREE, RECORDED, class_of
 from sph.problems.base import Section
 
 Count = Annotated[int, Field(ge=1)]
@@ -51,11 +51,11 @@ class Report(Section):
 class Run(Section):
     """Resources and arithmetic of the run."""
 
-    restart: ClassVar[str | None] = "free"
     threads: Count | Literal["all"] = Field(
         "all",
         description='number of threads; "all" uses every processor that the process may use. The '
         "number of threads changes no result",
+        json_schema_extra=FREE,  # type: ignore[arg-type]
     )
     precision: Literal["double", "single"] = Field(
         "double",
@@ -64,6 +64,9 @@ class Run(Section):
         json_schema_extra=RECORDED,  # type: ignore[arg-type]
     )
 
+
+# Keys of [run] that change no result.
+RESOURCES = tuple(key for key in Run.model_fields if class_of(Run, key) == "free")
 
 SECTIONS: dict[str, type[Section]] = {
     "time": Time,

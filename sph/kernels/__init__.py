@@ -54,6 +54,9 @@ def normalisation(self: Kernel, dim: Dim) -> float:
     return self.normalisation(dim)
 
 
+normalisation.takes_vectors = False  # type: ignore[attr-defined]
+
+
 @verb
 def w(self: Kernel, dim: Dim, q: Any) -> Any:
     return self.w(dim, q)

@@ -21,7 +21,7 @@ GROWTH = 0.05
 BUILD_OVER_PASSES = 0.3
 COPYING = 0.12
 
-# Extent of the region of a list in support diameters: a superblock of 128 particles and H around it.
+# Extent of the region of a list in support diameters: a superblock and H around it.
 WIDTH = 1.8
 
 # Share of superblocks above which all lists are built again instead of those that asked.
@@ -179,8 +179,10 @@ class Search:
         assert self.origin is not None
         assert self.lists is not None
         self._widenings += 1
-        asked = wanted > 1.0
-        factor = np.where(asked, wanted * (2.0 if self._widenings > PATIENCE else 1.0), 1.0)
+        asked = wanted > 0.0
+        # where particles have moved, lists reach less far than the supports they are built for
+        growth = (2.0 if self._widenings > PATIENCE else 1.0) / min(self.reach_factor, 1.0)
+        factor = np.where(asked, wanted * growth, 1.0)
         support = self.origin.support * np.repeat(factor, BLOCK)[: identity.size]
         origin = self.origin._replace(support=support)
         changed = self._check_reach(origin, identity)

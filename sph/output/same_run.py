@@ -60,9 +60,7 @@ def check_order(earlier: Path, later: Path, before: Checkpoint, after: Checkpoin
         )
     if after.lineage[: len(before.lineage)] != before.lineage:
         raise _other(later, f"its lineage does not continue that of {earlier.name}")
-    if after.lineage == before.lineage and after.config.to_toml(False) != before.config.to_toml(
-        False
-    ):
+    if after.lineage == before.lineage and after.config.recorded != before.config.recorded:
         raise _other(
             later, f"its configuration differs from that of {earlier.name}: {_key(before, after)}"
         )
@@ -70,7 +68,7 @@ def check_order(earlier: Path, later: Path, before: Checkpoint, after: Checkpoin
 
 def _key(before: Checkpoint, after: Checkpoint) -> str:
     """Return the first key that differs, with both values."""
-    tables = [one.config.to_toml(False).splitlines() for one in (before, after)]
+    tables = [one.config.recorded.splitlines() for one in (before, after)]
     pairs = itertools.zip_longest(*tables, fillvalue="nothing")
     return next(f"{there} and {here}" for there, here in pairs if there != here)
 

@@ -3,7 +3,7 @@
 from numba import types
 
 from sph.neighbours.order import BLOCK
-from sph.simd.lanes import picked
+from sph.simd.compaction import picked
 from sph.simd.memory import lanes_at, put_lanes
 from sph.simd.spatial import element, integer_plus
 from sph.simd.types import instruction, vector_type

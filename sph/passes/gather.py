@@ -36,6 +36,7 @@ from sph.simd import (
     minus,
     numbers_from,
     pick,
+    plus,
     rows,
     store,
     store_inside,
@@ -120,6 +121,22 @@ def fastest(dim, velocity, first, last):
         for i in range(first, last):
             found = larger(found, abs(velocity[d, i] - velocity[d, first]))
     return found
+
+
+@njit(**INLINED)
+def middle(dim, neighbours, first, last):
+    """Return the mean of the middles of the boxes of blocks [first, last).
+
+    Distances from there are half of those from a corner, and so is their round-off.
+    """
+    total = times(corner(dim, neighbours.boxes, first, 0), 0.0)
+    for block in range(first, last):
+        low, high = (
+            corner(dim, neighbours.boxes, block, 0),
+            corner(dim, neighbours.boxes, block, len(dim)),
+        )
+        total = plus(total, plus(low, high))
+    return times(total, 0.5 / (last - first))
 
 
 # --- copying ---

@@ -1,10 +1,10 @@
 """Explicit SIMD vectors in compiled code: several candidates of a particle per instruction.
 
 A vector (`Vec`) holds several numbers, one in each lane; a mask (`Mask`) holds as many truth
-values. Compiled code uses vectors like numbers: + - * / and comparisons, abs, np.sqrt, and `larger`
-and `smaller` of `sph.compiled`. In an operation of a vector and a number, the number applies to
-every lane, in the precision of the vector. The methods of models, such as kernels, therefore take
-vectors as they take numbers and NumPy arrays.
+values. Compiled code uses vectors like numbers: + - * / ** and comparisons, the NumPy functions in
+`sph.simd.functions`, and `larger` and `smaller` of `sph.compiled`. In an operation of a vector and
+a number, the number applies to every lane, in the precision of the vector. The methods of models,
+such as kernels, therefore take vectors as they take NumPy arrays.
 
 The arithmetic of a pass (`lanes`) decides the width and the precision when the pass is compiled:
 `DOUBLE`, `SINGLE`, or `SCALAR`, which computes one number at a time from the same source. LLVM
@@ -12,18 +12,16 @@ divides vectors that are wider than the registers of a processor, so the width i
 processor, and no function needs an instruction of one processor alone.
 """
 
+from sph.simd.compaction import INSTRUCTIONS, front, pick
 from sph.simd.lanes import (
-    PERMUTES,
     any_lane,
     block_width,
     count,
     filled,
     filled_block,
-    front,
     lane_max,
     lane_sum,
     numbers_from,
-    pick,
     width,
 )
 from sph.simd.memory import load, load_block, load_inside, rows, store, store_inside
@@ -51,7 +49,7 @@ from sph.simd.types import DOUBLE, SCALAR, SINGLE, Double, Mask, Scalar, Single,
 
 __all__ = [
     "DOUBLE",
-    "PERMUTES",
+    "INSTRUCTIONS",
     "SCALAR",
     "SINGLE",
     "Double",

@@ -1,18 +1,12 @@
-"""Operations between lanes: filling, sums, and moving some lanes to the front."""
+"""Operations between lanes: filling, sums, extremes and counts."""
 
-from typing import Any
-
-import llvmlite.binding as llvm
 from llvmlite import ir
 from numba import types
-from numba.core import cgutils, config
 
 from sph.simd.types import (
     FASTEST,
-    I32,
     I64,
     KINDS,
-    SHORT,
     Mask,
     Vec,
     call,
@@ -135,73 +129,3 @@ def any_lane(typing_context, mask):
         return builder.zext(value, I64)
 
     return types.int64(mask), generate
-
-
-def _has_avx512() -> bool:
-    """Return whether compiled code may use AVX-512 with vectors of any width."""
-    wanted = {"avx512f", "avx512vl"}
-    settings: Any = config
-    if settings.CPU_FEATURES is not None:
-        return wanted <= {one[1:] for one in settings.CPU_FEATURES.split(",") if one[:1] == "+"}
-    if settings.CPU_NAME not in (None, "host"):
-        return False
-    found = llvm.get_host_cpu_features()
-    return all(found.get(one, False) for one in wanted)
-
-
-PERMUTES = _has_avx512()
-
-
-@instruction
-def front(typing_context, lanes, mask):
-    """Return the numbers of the true lanes, in order, for `pick`."""
-    if not (isinstance(mask, Mask) and PERMUTES):
-        return mask(lanes, mask), lambda context, builder, sig, arguments: arguments[1]
-    integer = types.int64 if lanes.instance_class.kind == types.float64 else types.int32
-    kind = Vec(integer, mask.width)
-
-    def generate(context, builder, sig, arguments):
-        numbers = integers(range(mask.width), KINDS[integer])
-        return call(
-            builder, "llvm.experimental.vector.compress", kind, llvm_type(kind),
-            (numbers, arguments[1], ir.Constant(llvm_type(kind), ir.Undefined)), (),
-        )  # fmt: skip
-
-    return kind(lanes, mask), generate
-
-
-# Permutations of lanes by a vector of lane numbers.
-_PERMUTATIONS = {
-    ("f64", 8): "llvm.x86.avx512.permvar.df.512",
-    ("f32", 16): "llvm.x86.avx512.permvar.sf.512",
-    ("f32", 8): "llvm.x86.avx2.permps",
-    ("i32", 8): "llvm.x86.avx2.permd",
-}
-
-
-def picked(builder, kind, value, lanes, chosen):
-    """Return LLVM code for `pick`; kind, lanes: types of the value and of what `front` returned."""
-    if not isinstance(kind, Vec):
-        return value
-    result = llvm_type(kind)
-    if isinstance(lanes, Mask):  # 28 cycles for 8 lanes on processors without AVX-512
-        return call(
-            builder, "llvm.experimental.vector.compress", kind, result,
-            (value, chosen, ir.Constant(result, ir.Undefined)), (),
-        )  # fmt: skip
-    if lanes.kind == types.int64 and kind.kind != types.float64:
-        chosen = builder.trunc(chosen, ir.VectorType(I32, kind.width))
-    function = cgutils.get_or_insert_function(
-        builder.module,
-        ir.FunctionType(result, [result, chosen.type]),
-        _PERMUTATIONS[SHORT[kind.kind], kind.width],
-    )
-    return builder.call(function, (value, chosen))
-
-
-@instruction
-def pick(typing_context, x, lanes):
-    """Return the lanes of x that `front` numbers, at the front; the others are undefined."""
-    return x(x, lanes), lambda context, builder, sig, arguments: picked(
-        builder, sig.args[0], arguments[0], sig.args[1], arguments[1]
-    )

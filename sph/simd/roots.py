@@ -4,7 +4,7 @@ from llvmlite import ir
 from numba import types
 from numba.core import cgutils
 
-from sph.simd.lanes import PERMUTES
+from sph.simd.compaction import AVX512
 from sph.simd.types import EXACT, I32, I64, Vec, constant, instruction, llvm_type
 
 # First guesses by an integer operation on the exponent, with an error of 3.5 % at most (Lomont
@@ -25,7 +25,7 @@ _ESTIMATES = {
 
 def _guess(builder, x, kind, value, n, base):
     """Return LLVM code for a guess of value^(-1/n), and the numbers of terms of the steps."""
-    if n == 2 and PERMUTES and isinstance(x, Vec) and (base, x.width) in _ESTIMATES:
+    if n == 2 and AVX512 and isinstance(x, Vec) and (base, x.width) in _ESTIMATES:
         name, steps = _ESTIMATES[base, x.width]
         every = ir.IntType(max(8, x.width))
         function = cgutils.get_or_insert_function(

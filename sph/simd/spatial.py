@@ -7,7 +7,8 @@ of dimensions is the length of `dim`, a constant for the compiler; no loop remai
 from numba import types
 from numba.core import cgutils
 
-from sph.simd.lanes import picked, summed
+from sph.simd.compaction import picked
+from sph.simd.lanes import summed
 from sph.simd.memory import address, lanes_at, put_lanes
 from sph.simd.types import (
     FAST,

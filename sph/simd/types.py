@@ -5,7 +5,8 @@ from typing import Any, NamedTuple
 from llvmlite import ir
 from numba import types
 from numba.core import cgutils
-from numba.extending import intrinsic, models, register_model
+from numba.core.typeconv import Conversion
+from numba.extending import intrinsic, lower_cast, models, register_model
 
 from sph.compiled import FASTMATH
 
@@ -48,6 +49,10 @@ class Scalar(NamedTuple):
 DOUBLE, SINGLE, SCALAR = Double(), Single(), Scalar()  # type: ignore[call-arg]
 
 
+def is_number(kind) -> bool:
+    return isinstance(kind, types.Number | types.Boolean)
+
+
 class Vec(types.Type):
     """`width` numbers of type `kind`."""
 
@@ -55,13 +60,20 @@ class Vec(types.Type):
         self.kind, self.width = kind, width
         super().__init__(f"Vec({kind}, {width})")
 
+    def unify(self, typingctx, other):
+        """A variable that is a vector or a number, depending on a condition, is a vector."""
+        return self if is_number(other) else None
+
+    def can_convert_from(self, typingctx, other):
+        return Conversion.safe if is_number(other) else None
+
 
 class Mask(types.Type):
-    """`width` truth values."""
+    """The truth values of a comparison of vectors of type `compared`."""
 
-    def __init__(self, width):
-        self.width = width
-        super().__init__(f"Mask({width})")
+    def __init__(self, compared):
+        self.compared, self.width = compared, compared.width
+        super().__init__(f"Mask({compared})")
 
 
 KINDS = {
@@ -111,16 +123,24 @@ def constant(kind, value):
     return ir.Constant(kind, value)
 
 
-def call(builder, name, kind: Vec, result, arguments, flags=FAST):
-    """Call the LLVM intrinsic `name` for vectors of a type."""
-    full = f"{name}.v{kind.width}{SHORT[kind.kind]}"
+def call(builder, name, kind, result, arguments, flags=FAST):
+    """Call the LLVM intrinsic `name` for vectors of a type, or for numbers."""
+    suffix = f"v{kind.width}{SHORT[kind.kind]}" if isinstance(kind, Vec) else SHORT[kind]
+    full = f"{name}.{suffix}"
     function_type = ir.FunctionType(result, [argument.type for argument in arguments])
     function = cgutils.get_or_insert_function(builder.module, function_type, full)
     return builder.call(function, arguments, fastmath=flags)
 
 
 def as_vector(context, builder, value, kind, wanted: Vec):
-    """Return a value of type `kind` as a vector of type `wanted`."""
+    """Return a value of type `kind` as a vector of type `wanted`; a mask is 1 where true."""
     if isinstance(kind, Vec):
         return value
+    if isinstance(kind, Mask):
+        return builder.uitofp(value, llvm_type(wanted))
     return in_every_lane(builder, context.cast(builder, value, kind, wanted.kind), wanted)
+
+
+@lower_cast(types.Number, Vec)
+def _cast(context, builder, kind, wanted, value):
+    return as_vector(context, builder, value, kind, wanted)

@@ -23,12 +23,12 @@ from sph.sweep.task import Outcome, Task, tasks
 class Suite:
     """Cases in a directory, and a task for each setting of each case."""
 
-    def __init__(self, cases: Sequence[Case], directory: Path):
+    def __init__(self, cases: Sequence[Case], directory: Path, overrides: Sequence[str] = ()):
         self.cases = list(cases)
         self.directory = directory
         self.runs: dict[str, tuple[Case, str, Task]] = {}
         for case in self.cases:
-            plan = Plan((), {}, tuple(_point(case, name) for name in case.settings))
+            plan = Plan(tuple(overrides), {}, tuple(_point(case, name) for name in case.settings))
             sweep = SweepDirectory(directory.absolute() / case.name)
             _prepare(sweep, case, plan)
             for name, task in zip(case.settings, tasks(sweep, plan), strict=True):
@@ -43,14 +43,15 @@ class Suite:
 
 
 def run(
-    only: Sequence[str], directory: Path, jobs: int | None = None
+    only: Sequence[str], directory: Path, jobs: int | None = None, overrides: Sequence[str] = ()
 ) -> tuple[Suite, list[Result]]:
     """Run the cases of these names and judge them; writes stress.json and stress.md.
 
-    Raises ConfigError before any run starts, FileError also where a run could not write a file, and
-    Stopped where a run was stopped.
+    overrides: `a.b=VALUE` for all cases; the settings of a case take precedence. Raises ConfigError
+    before any run starts, FileError also where a run could not write a file, and Stopped where a
+    run was stopped.
     """
-    suite = Suite(load(only), directory)
+    suite = Suite(load(only), directory, overrides)
     missing = [task for _, _, task in suite.runs.values() if not _has_ended(task)]
     told = _Told(suite, len(missing))
     try:

@@ -157,8 +157,8 @@ def has_checkpoints(run: RunDirectory) -> bool:
 
 
 def _refuse_change(what: str, there: Config | None, now: Config) -> None:
-    """Raise ConfigError with the keys that differ, but for the table [run]."""
-    if there is not None and there.to_toml(include_run=False) == now.to_toml(include_run=False):
+    """Raise ConfigError with the keys that differ, except those that change no result."""
+    if there is not None and there.recorded == now.recorded:
         return
     differences = [] if there is None else _differences(there, now)
     told = "".join(f"\n  {line}" for line in differences)
@@ -167,7 +167,7 @@ def _refuse_change(what: str, there: Config | None, now: Config) -> None:
 
 
 def _differences(there: Config, now: Config) -> list[str]:
-    before, after = (tomllib.loads(one.to_toml(include_run=False)) for one in (there, now))
+    before, after = (tomllib.loads(one.recorded) for one in (there, now))
 
     def shown(table: dict, key: str) -> str:
         return value_text(table[key]) if key in table else "not set"

@@ -10,6 +10,7 @@ from typing import Any
 
 from sph import warnings
 from sph.config import reading
+from sph.config.sections import RESOURCES
 from sph.config.toml_text import value_text
 from sph.errors import ConfigError, FileError
 from sph.output.files import read_text
@@ -24,7 +25,7 @@ class Row:
 
     path: Path
     name: str
-    settings: dict[str, Any]  # every key of the resolved configuration but [run], as table.key
+    settings: dict[str, Any]  # resolved configuration, as table.key, without RESOURCES
     summary: Summary | None  # None before the run has ended
     status: str  # "done", "stopped", "failed" or "unfinished"
     reason: str = ""
@@ -175,7 +176,7 @@ def _row(path: Path) -> Row:
 
 
 def _settings(path: Path) -> dict[str, Any]:
-    """Every key of a run's config.toml but those of [run], as table.key. Raises FileError."""
+    """Every key of a run's config.toml but RESOURCES, as table.key. Raises FileError."""
     try:
         tables = reading.parse(read_text(path), str(path)).tables
     except ConfigError as error:
@@ -186,8 +187,8 @@ def _settings(path: Path) -> dict[str, Any]:
     return {
         f"{table}.{key}": value
         for table, keys in tables.items()
-        if table != "run"
         for key, value in keys.items()
+        if not (table == "run" and key in RESOURCES)
     }
 
 

@@ -4,7 +4,7 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from sph import faults, kernels, registry
+from sph import declarations, faults, kernels, registry
 from sph.eos import is_ideal
 from sph.formulations import Formulation
 from sph.formulations.gas.density import density
@@ -98,6 +98,7 @@ class Gas(Formulation):
         self.starting_models = self._models(scene, terms, Smoothing(0, tolerance))
         passes = 0 if physics.density_passes == "converged" else physics.density_passes
         self.models = self._models(scene, terms, Smoothing(passes, tolerance))
+        declarations.check_on_vectors(self.models)
         self.eos = self.models.eos
         self.idle = ("check",) if self.eos.lowest_energy is None else ()
         self.passes = self._passes(scene)

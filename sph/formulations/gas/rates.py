@@ -19,6 +19,7 @@ from sph.passes.gather import (
     largest_of,
     load_of,
     longest_list,
+    middle,
     near_blocks,
     near_particles,
     own_box,
@@ -85,7 +86,7 @@ def rates(
     for superblock in range(first, last):
         begin, end = lists.first[superblock], lists.first[superblock + 1]
         i_0, i_end = begin * BLOCK, min(end * BLOCK, mass.size)
-        x_0, v_0 = at(dim, position, i_0), at(dim, velocity, i_0)
+        x_0, v_0 = middle(dim, neighbours, begin, end), at(dim, velocity, i_0)
         per_length = unit(largest_of(support, i_0, i_end))
         per_velocity = unit(largest_of(sound_speed, i_0, i_end))
         per_mass = unit(largest_of(mass, i_0, i_end))
@@ -134,6 +135,7 @@ def rates(
                 x_i = times(minus(at(dim, position, i), x_0), per_length)
                 v_i = times(minus(at(dim, velocity, i), v_0), per_velocity)
                 rho_i, c_i = density[i] * per_density, sound_speed[i] * per_velocity
+                rho_inv_i = 1.0 / rho_i
                 P_term_i = pressure_term[i] * per_term
                 H_inv_i = 1.0 / (support[i] * per_length)
                 gradient_i = H_inv_i ** (D + 2)
@@ -149,7 +151,7 @@ def rates(
                     squared = dot(r_ij, r_ij) + TINY
                     v_dot_r = dot(v_ij, r_ij)
                     rho_j = load(lanes, near, (rest + RHO, k))
-                    rho_sum = rho_i + rho_j
+                    rho_sum = 1.0 + rho_j * rho_inv_i  # over rho_i, lest its square underflow
                     # one root serves 1/r and 1/(rho_i + rho_j)
                     inverse = inverse_sqrt(squared * (rho_sum * rho_sum))
                     r_inv = inverse * rho_sum
@@ -164,7 +166,7 @@ def rates(
                     # eq 24: alpha/2 v_sig w_ij/rho_ij with rho_ij = (rho_i + rho_j)/2
                     alpha_j = load_of(alpha, lanes, near, a_row, k)
                     alpha_ij = pair_alpha(viscosity, value_of(alpha, i), alpha_j)
-                    Pi = (v_sig * w_ij) * (inverse * r) * -alpha_ij
+                    Pi = (v_sig * w_ij) * (inverse * r) * (-rho_inv_i * alpha_ij)
                     if balsara is not None:
                         Pi *= 0.5 * balsara[i] + load(lanes, near, (f_row, k))
                     term_i, term_j = _terms(
@@ -183,7 +185,7 @@ def rates(
                         )  # fmt: skip
                         # Price (2008) eq 27: over rho_ij = (rho_i + rho_j)/2
                         jump = exchanged[i] * per_energy - load(lanes, near, (u_row, k))
-                        exchange = speed * jump * 2.0 * (inverse * r)
+                        exchange = speed * jump * (2.0 * rho_inv_i) * (inverse * r)
                         if shares is not None:
                             exchange *= 0.5 * shares[i] + load(lanes, near, (share_row, k))
                         gained += (slope_i + slope_j) * r * exchange  # slope r is m_j dW/dr

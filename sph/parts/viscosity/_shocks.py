@@ -67,6 +67,9 @@ def alpha_after(
     )  # fmt: skip
 
 
+alpha_after.takes_vectors = False  # type: ignore[attr-defined]
+
+
 @njit(**INLINED)
 def _invert(matrix, inverse):
     """Write the inverse of a symmetric positive (D, D) matrix, zero if singular (Gauss-Jordan).

@@ -215,11 +215,10 @@ def test_resolved_text_has_every_key_in_order():
     assert keys == declared
 
 
-def test_run_table_may_be_omitted():
-    found = default("run.threads=1")
-    text = found.to_toml(include_run=False)
-    assert "[run]" not in text
-    assert config.from_text(text) == found.override(["run.threads=all"])
+def test_recorded_text_has_no_key_that_changes_no_result():
+    found = default("run.threads=1", "run.precision=single")
+    assert "threads" not in found.recorded
+    assert config.from_text(found.recorded) == found.override(["run.threads=all"])
 
 
 @pytest.mark.parametrize("folder", ["sph.kernels", "sph.eos", "sph.parts.external"])

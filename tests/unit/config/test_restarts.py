@@ -33,7 +33,8 @@ RECORDED = ["physics.scheme=variational", "physics.kernel=cubic_spline", "physic
             "physics.alpha=2.0", "physics.conductivity=approach", "physics.eta=1.5",
             "physics.allow_pairing=true", "physics.max_support=2.0", "physics.C=0.1",
             "physics.balsara=false",
-            "physics.density_passes=3", "physics.energy_limit=false"]  # fmt: skip
+            "physics.density_passes=3", "physics.energy_limit=false",
+            "run.precision=single"]  # fmt: skip
 REFUSED = ["physics.gamma=1.6", 'physics.eos={ name = "ideal_gas", gamma = 1.6 }',
            'physics.external={ name = "point_mass", mass = 1.0 }', HEATING, RANGE,
            "problem.n=61", "problem.density=2.0"]  # fmt: skip

@@ -116,7 +116,7 @@ def test_private_datasets_equal_numerical_state(written, make_state):
         for name, array in arrays.items():
             assert group[name].shape == array.shape, name
         assert all(group[name].shape == () for name in scalars)
-        assert "[run]" not in group.attrs["configuration"]
+        assert "threads" not in group.attrs["configuration"]
         assert "[physics]" in group.attrs["configuration"]
 
 

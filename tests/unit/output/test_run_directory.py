@@ -245,6 +245,6 @@ def test_summary_is_valid_json(run):
 def test_configuration_reads_back(run, make_state):
     from sph import config
 
-    text = make_state().config.to_toml(include_run=True)
+    text = make_state().config.to_toml()
     run.write_config(text)
     assert config.load(run.config) == config.from_text(text)

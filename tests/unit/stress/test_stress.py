@@ -138,6 +138,20 @@ def test_finished_case_is_judged_without_running_again(stress, tmp_path):
 
 
 @pytest.mark.slow
+def test_set_applies_to_all_settings_and_is_not_changed_in_a_directory(stress, tmp_path):
+    own = STILL + 'set = ["physics.C=0.1"]\n'
+    options = ("--set", "run.precision=single", "--set", "physics.C=0.2")
+    result, _, _ = stress(own, *options)
+    assert result.exit_code == 0, result.output
+    found = configuration.load(tmp_path / "out" / "still" / "still.right" / "config.toml")
+    assert found.run.precision == "single"
+    assert found.physics.C == 0.1  # of the setting
+    result, _, _ = stress(own)
+    assert result.exit_code == 2
+    assert 'run.precision = "single" there, "double" now' in result.stderr
+
+
+@pytest.mark.slow
 def test_only_named_cases_run(stress):
     result, _, _ = stress(STILL, "--only", "st*")
     assert result.exit_code == 0

@@ -42,6 +42,9 @@ def summed_terms(self, eos, energy, density_of_energy, slope):
     return self.summed_terms(eos, energy, density_of_energy, slope)
 
 
+summed_terms.takes_vectors = False  # type: ignore[attr-defined]
+
+
 def make(name: str):
     """Return the scheme of that name, e.g. make("grad_h")."""
     return registry.model_class("sph.formulations.gas.schemes", name)()
