@@ -23,19 +23,19 @@ FASTMATH = {"nsz", "arcp", "contract", "afn", "reassoc"}
 FLAGS: dict[str, Any] = {"fastmath": FASTMATH, "error_model": "numpy"}
 
 # Numba adds to each function a wrapper for callers from C. There are none.
-_LEAN: dict[str, Any] = {"no_cfunc_wrapper": True, "pipeline_class": Lean}
+LEAN: dict[str, Any] = {"no_cfunc_wrapper": True, "pipeline_class": Lean}
 
 # Options of every compiled function: @njit(**COMPILED). None is compiled with parallel=True: passes
 # release the interpreter's lock and run over ranges of blocks on Python threads (sph/threads.py),
 # which costs no second compilation and takes nested models.
-COMPILED: dict[str, Any] = {"cache": True, "nogil": True, **FLAGS, **_LEAN}
+COMPILED: dict[str, Any] = {"cache": True, "nogil": True, **FLAGS, **LEAN}
 
 
 # For functions with floating-point sums that other compiled functions call. A function that is not
 # inlined exists in two compiled copies, which may round differently: the process that compiles the
 # caller uses one copy, and a process that finds the caller in the cache uses the other. Python
 # cannot call them: the wrapper for that would hold the code a second time.
-INLINED: dict[str, Any] = {**FLAGS, **_LEAN, "forceinline": True, "no_cpython_wrapper": True}
+INLINED: dict[str, Any] = {**FLAGS, **LEAN, "forceinline": True, "no_cpython_wrapper": True}
 
 
 Verb = TypeVar("Verb", bound=Callable[..., Any])

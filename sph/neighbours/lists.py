@@ -12,6 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
+from sph.arrays import empty
 from sph.compiled import COMPILED, INLINED
 from sph.domain import Images
 from sph.neighbours.order import BLOCK
@@ -38,7 +39,7 @@ class Lists(NamedTuple):
 def _superblocks(tree: Tree, found: np.ndarray) -> int:
     """Write the first block of each superblock, in order, to `found`; return how many there are."""
     first, last = tree.first, tree.last
-    stack = np.empty(128, np.int64)
+    stack = empty(128, np.int64)
     stack[0] = 0
     depth, number = 1, 0
     while depth > 0:
@@ -83,8 +84,8 @@ def _fill(superblock, dim, tree, leaf, stretch, images, first, entries, begin, r
     node_first, node_last, lower, upper, largest = tree
     sign, offset = images
     a, b = first[superblock], first[superblock + 1]
-    stack = np.empty(128, np.int64)
-    own_lower, own_upper = np.empty((1, len(dim))), np.empty((1, len(dim)))
+    stack = empty(128, np.int64)
+    own_lower, own_upper = empty((1, len(dim)), np.float64), empty((1, len(dim)), np.float64)
     H = 0.0
     for block in range(a, b):
         H = max(H, largest[leaf[block]])
@@ -152,7 +153,7 @@ def _fill_chunks(
 @njit(**COMPILED)
 def _regions(room, begin):
     """Return where the region of each chunk begins and, last, where the storage ends."""
-    region = np.empty(room.size + 1, np.int64)
+    region = empty(room.size + 1, np.int64)
     region[0] = begin
     for chunk in range(room.size):
         # 15 % to spare: lists rebuilt in a developing flow then rarely have to be built twice
@@ -164,7 +165,7 @@ def _regions(room, begin):
 @njit(**COMPILED)
 def leaves(tree: Tree) -> np.ndarray:
     """Return the node of each block, (blocks,)."""
-    found = np.empty(tree.last[0], np.int64)
+    found = empty(tree.last[0], np.int64)
     for node in range(tree.first.size):
         if tree.first[node] >= 0 and tree.last[node] - tree.first[node] == 1:
             found[tree.first[node]] = node

@@ -17,6 +17,7 @@ import numpy as np
 from numba import njit, types
 from numba.extending import overload
 
+from sph.arrays import empty
 from sph.compiled import INLINED, larger
 from sph.neighbours.lists import IMAGE_SHIFT
 from sph.neighbours.order import BLOCK
@@ -92,7 +93,7 @@ def scratch(lanes, dim, blocks, quantities):
         rows(lanes, 1, blocks * quantities * BLOCK)[0],
         rows(lanes, quantities, length),
         rows(lanes, 2 * len(dim) + 1, blocks + BLOCK),
-        np.empty(blocks + BLOCK, np.int32),
+        empty(blocks + BLOCK, np.int32),
     )
 
 

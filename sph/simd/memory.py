@@ -3,12 +3,11 @@
 from llvmlite import ir
 from numba import types
 from numba.core import cgutils
-from numba.np.arrayobj import make_array, populate_array
 
+from sph.arrays import allocate
 from sph.simd.types import (
     I32,
     I64,
-    KINDS,
     Vec,
     in_every_lane,
     instruction,
@@ -16,8 +15,6 @@ from sph.simd.types import (
     llvm_type,
     vector_type,
 )
-
-CACHE_LINE = 64  # bytes
 
 
 def address(context, builder, array_type, array, index_type, index):
@@ -163,7 +160,7 @@ def first_lanes(builder, number, width):
 def rows(typing_context, lanes, number, length):
     """Return an array (number, length) in the precision of `lanes`, aligned to cache lines.
 
-    Raises MemoryError. This is np.empty in a few instructions, which compiles in no time.
+    Raises MemoryError.
     """
     kind = types.Array(lanes.instance_class.kind, 2, "C")
 
@@ -172,18 +169,6 @@ def rows(typing_context, lanes, number, length):
             context.cast(builder, value, given, types.intp)
             for value, given in zip(arguments[1:], sig.args[1:], strict=True)
         ]
-        item = context.get_constant(types.intp, kind.dtype.bitwidth // 8)
-        stride = builder.mul(item, shape[1])
-        size = builder.mul(stride, shape[0])
-        block = context.nrt.meminfo_alloc_aligned(builder, size, CACHE_LINE)
-        array = make_array(kind)(context, builder)
-        populate_array(
-            array,
-            data=builder.bitcast(
-                context.nrt.meminfo_data(builder, block), KINDS[kind.dtype].as_pointer()
-            ),
-            shape=shape, strides=[stride, item], itemsize=item, meminfo=block,
-        )  # fmt: skip
-        return array._getvalue()
+        return allocate(context, builder, kind, shape)
 
     return kind(lanes, number, length), generate
