@@ -380,7 +380,7 @@ def _selected(first, last, dim, neighbours, position, support, support_inverse, 
     """
     D, lanes, lists, n = len(dim), neighbours.lanes, neighbours.lists, support.size
     fields = dim + (0, 0)  # noqa: RUF005  # position, number, 1/H
-    copied, near, boxes, chosen = scratch(lanes, dim, longest_list(first, last, lists), fields)
+    copied, near, boxes, chosen = scratch(lanes, dim, longest_list(first, last, lists), len(fields))
     for superblock in range(first, last):
         begin, end = lists.first[superblock], lists.first[superblock + 1]
         x_0 = at(dim, position, begin * BLOCK)
@@ -483,7 +483,7 @@ def test_selection_is_independent_of_when_lists_were_built(boundaries, own):
 def _chosen(first, last, dim, neighbours, position, per_length, reach):
     """Return how many blocks of each list are within `reach` of the first of its superblock."""
     lanes, lists = neighbours.lanes, neighbours.lists
-    _, _, boxes, chosen = scratch(lanes, dim, longest_list(first, last, lists), dim)
+    _, _, boxes, chosen = scratch(lanes, dim, longest_list(first, last, lists), len(dim))
     number = np.empty(last - first, np.int64)
     for one in range(first, last):
         own = lists.first[one]

@@ -11,7 +11,7 @@ from lanes import LANES, compiled, every_lanes, precision
 
 from sph import compiled as of_sph
 from sph import simd
-from sph.simd.memory import CACHE_LINE
+from sph.arrays import CACHE_LINE
 
 N = 32  # a multiple of all widths
 EXPRESSIONS = [
