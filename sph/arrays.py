@@ -4,10 +4,13 @@ np.empty is a function of its own for each kind of array, compiled anew in each 
 compiles a caller: 0.3 CPU seconds in a first run.
 """
 
+from typing import Any
+
 from numba import types
 from numba.core import cgutils
-from numba.extending import intrinsic
 from numba.np.arrayobj import make_array, populate_array
+
+from sph.compiled import instruction
 
 CACHE_LINE = 64  # bytes
 
@@ -17,7 +20,8 @@ def allocate(context, builder, kind: types.Array, shape):
 
     The code raises MemoryError.
     """
-    item = context.get_constant(types.intp, kind.dtype.bitwidth // 8)
+    number: Any = kind.dtype
+    item = context.get_constant(types.intp, number.bitwidth // 8)
     strides = [item]
     for length in reversed(shape):
         strides.insert(0, builder.mul(length, strides[0]))
@@ -32,13 +36,13 @@ def allocate(context, builder, kind: types.Array, shape):
     return array._getvalue()
 
 
-@intrinsic
+@instruction
 def empty(typing_context, shape, kind):
     """Return an array with undefined entries, as np.empty(shape, kind) does.
 
     shape: an integer or a tuple of integers; kind: np.float64, np.int64 or another number.
     """
-    lengths = list(shape) if isinstance(shape, types.BaseTuple) else [shape]
+    lengths: Any = list(shape) if isinstance(shape, types.BaseTuple) else [shape]  # type: ignore[call-overload]
     array = types.Array(kind.dtype, len(lengths), "C")
 
     def generate(context, builder, sig, arguments):

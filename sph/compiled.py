@@ -8,7 +8,7 @@ import numpy as np
 from llvmlite import ir
 from numba import types
 from numba.core.typing.templates import AbstractTemplate, infer_global, signature
-from numba.extending import lower_builtin, overload
+from numba.extending import intrinsic, lower_builtin, overload
 
 from sph import compile_cache, lean_compiler
 from sph.lean_compiler import Lean
@@ -68,6 +68,11 @@ def verb(stub: Verb) -> Verb:
     stub.takes_vectors = True  # type: ignore[attr-defined]
     VERBS[name] = stub
     return stub
+
+
+def instruction(emit) -> Any:
+    """Make a function that returns (signature, LLVM code) one that compiled code can call."""
+    return intrinsic(emit)
 
 
 def larger(a, b):

@@ -73,7 +73,8 @@ class Library(codegen.JITCodeLibrary):
         for variable in self._final_module.global_variables:
             found = environment.lookup_environment(variable.name)
             if found is not None and not variable.is_declaration:
-                self._codegen.set_env(variable.name, found)
+                engine: Any = self._codegen
+                engine.set_env(variable.name, found)
 
 
 def install() -> None:

@@ -5,12 +5,12 @@ from numba import types
 from numba.core import cgutils
 
 from sph.arrays import allocate
+from sph.compiled import instruction
 from sph.simd.types import (
     I32,
     I64,
     Vec,
     in_every_lane,
-    instruction,
     integers,
     llvm_type,
     vector_type,
