@@ -115,8 +115,9 @@ def _fields(checkpoint, frame: Frame) -> Iterator[tuple[Public, np.ndarray, Rows
     }
     for field in particles.fields:
         if field.public is not None and field.stored:
-            usual: Any = _in_three_dimensions if field.rank else _unchanged
-            yield field.public, getattr(particles, field.name), special.get(field.name, usual)
+            usual = _in_three_dimensions if field.rank else _unchanged
+            rows: Any = special.get(field.name, usual)
+            yield field.public, getattr(particles, field.name), rows
     yield PRESSURE, checkpoint.pressure, _unchanged
 
 
