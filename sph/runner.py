@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from sph import faults
+from sph import allocation, faults
 from sph.analysis import reference, summary
 from sph.clock import Clock
 from sph.config import Config
@@ -64,6 +64,7 @@ def session(directory: RunDirectory, config: Config, progress) -> Iterator[tuple
             f"run.threads = {threads}, but this process may use only {processors} processor(s): "
             "more threads do not make the run faster, and do not change its results"
         )
+    allocation.return_large_arrays()
     # the watchdog reports non-finite values, so warnings of NumPy are not needed
     quiet = np.errstate(all="ignore")
     with directory.alone(), stop_signals() as stopped_by, closing(Clock()) as clock, quiet:
@@ -261,6 +262,7 @@ class Runner:
     def _close(self, status: str, reason: str | None = None) -> dict:
         self._record()
         self.history.flush()
+        self.simulation.end()
         result = summary.of_run(
             self.simulation,
             read_history(self.directory.history),

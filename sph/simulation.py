@@ -228,6 +228,10 @@ class Simulation:
                 raise faults.fault(self, f"{name} is {value}", faults.of_numbers(self), 0)
         return {name: found[name] for name in scene.columns}
 
+    def end(self) -> None:
+        """Free the work arrays, which only further steps need, before the results are judged."""
+        self.particles.declare(field for field in self.particles.fields if field.stored)
+
     def close(self) -> None:
         self.team.close()
 
@@ -238,6 +242,7 @@ class Simulation:
         p = self.particles
         self.list_builds += 1
         with self.clock.phase("order"):
+            self.search.forget()
             self._bring_inside()
             p.reorder(self.search.order(p.position, p.id), self._carried, self.team)
         with self.clock.phase("lists"):

@@ -12,8 +12,9 @@ from sph.summary import Conservation, Nearest, Summary, figure
 
 # Limit of the stress suite for settings that pass; a larger drift is an error of time integration.
 DRIFT = 1e-3
-# Pair forces are equal and opposite: more is neither round-off nor an error of time integration.
-MOMENTUM = 1e-6
+# Pair forces are equal and opposite: more is neither round-off nor an error of time integration. In
+# single precision round-off added up to 3e-7 in 1000 steps of 256 particles (configs/moving_box).
+MOMENTUM = {"double": 1e-6, "single": 1e-4}
 # In shipped configurations sum m/rho is within 5 % of the box's volume, in most within 3 %. With
 # too few neighbours (eta = 0.85 in 2-D) it is wrong by 12 %.
 VOLUME = 0.06
@@ -32,16 +33,17 @@ class Warning(NamedTuple):
 
 def of_run(simulation, summary: Summary) -> list[Warning]:
     """Return the warnings of a run, from its final state and its summary."""
-    problem = simulation.scene.config.problem
+    config = simulation.scene.config
+    problem, precision = config.problem, config.run.precision
     return [
         *_swamped(problem, summary),
         *_energy(summary["conservation"]),
-        *_momentum(summary["conservation"]),
+        *_momentum(summary["conservation"], MOMENTUM[precision]),
         *_volume(summary["conservation"]),
         *_held(simulation),
         *_resolution(simulation),
         *_paired(summary["nearest"]),
-        *_limits(problem, summary),
+        *_limits(problem, summary, precision),
     ]
 
 
@@ -76,12 +78,12 @@ def _energy(kept: Conservation) -> Iterator[Warning]:
         )
 
 
-def _momentum(kept: Conservation) -> Iterator[Warning]:
+def _momentum(kept: Conservation, most: float) -> Iterator[Warning]:
     change = kept["momentum_change"]
-    if change is not None and not change <= MOMENTUM:
+    if change is not None and not change <= most:
         yield Warning(
             "momentum",
-            f"total momentum changed by {change:.2g} of sum m(|v| + c), more than {MOMENTUM:g}. "
+            f"total momentum changed by {change:.2g} of sum m(|v| + c), more than {most:g}. "
             "Pair forces conserve momentum to round-off, so this is a fault of the program. Try "
             "another physics.scheme, and please report this run.",
         )
@@ -125,8 +127,10 @@ def _paired(nearest: Nearest | None) -> Iterator[Warning]:
         )
 
 
-def _limits(problem, summary: Summary) -> Iterator[Warning]:
+def _limits(problem, summary: Summary, precision: str) -> Iterator[Warning]:
     for name, limit in problem.allowed().items():
+        if name == "momentum_change" and precision == "single":
+            continue  # a problem's limit is the round-off of double precision
         value = figure(summary, name)
         if value is None or limit.holds(value) or _is_said(name, problem, summary):
             continue

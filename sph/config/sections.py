@@ -55,7 +55,7 @@ class Run(Section):
         "all",
         description='number of threads; "all" uses every processor that the process may use. The '
         "number of threads changes no result",
-        json_schema_extra=FREE,
+        json_schema_extra=FREE,  # type: ignore[arg-type]
     )
     precision: Literal["double", "single"] = Field(
         "double",

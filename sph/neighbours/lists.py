@@ -12,6 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
+from sph.arrays import empty
 from sph.compiled import COMPILED, INLINED
 from sph.domain import Images
 from sph.neighbours.order import BLOCK
@@ -35,11 +36,10 @@ class Lists(NamedTuple):
 
 
 @njit(**COMPILED)
-def superblocks(tree: Tree) -> np.ndarray:
-    """Return the first block of each superblock, in order, and the number of blocks."""
+def _superblocks(tree: Tree, found: np.ndarray) -> int:
+    """Write the first block of each superblock, in order, to `found`; return how many there are."""
     first, last = tree.first, tree.last
-    found = np.empty(last[0] + 1, np.int64)
-    stack = np.empty(128, np.int64)
+    stack = empty(128, np.int64)
     stack[0] = 0
     depth, number = 1, 0
     while depth > 0:
@@ -52,8 +52,14 @@ def superblocks(tree: Tree) -> np.ndarray:
             stack[depth] = 2 * node + 2
             stack[depth + 1] = 2 * node + 1
             depth += 2
-    found[number] = last[0]
-    return found[: number + 1].copy()
+    return number
+
+
+def superblocks(tree: Tree) -> np.ndarray:
+    """Return the first block of each superblock, in order, and the number of blocks."""
+    blocks = tree.last[0]
+    found = np.empty(blocks, np.int64)
+    return np.append(found[: _superblocks(tree, found)], blocks)
 
 
 @njit(**INLINED)
@@ -78,8 +84,8 @@ def _fill(superblock, dim, tree, leaf, stretch, images, first, entries, begin, r
     node_first, node_last, lower, upper, largest = tree
     sign, offset = images
     a, b = first[superblock], first[superblock + 1]
-    stack = np.empty(128, np.int64)
-    own_lower, own_upper = np.empty((1, len(dim))), np.empty((1, len(dim)))
+    stack = empty(128, np.int64)
+    own_lower, own_upper = empty((1, len(dim)), np.float64), empty((1, len(dim)), np.float64)
     H = 0.0
     for block in range(a, b):
         H = max(H, largest[leaf[block]])
@@ -128,7 +134,10 @@ def _fill_chunks(
     first_chunk, last_chunk, dim, tree, leaf, stretch, images, wanted, first, region, start, count,
     entries, needed,
 ):  # fmt: skip
-    """Fill the lists of `wanted` superblocks; needed: room that each chunk needs."""
+    """Fill the lists of `wanted` superblocks; needed: room that each chunk needs.
+
+    region: where the storage of each chunk begins and, last, where all storage ends.
+    """
     superblocks = first.size - 1
     for chunk in range(first_chunk, last_chunk):
         begin, end = region[chunk], region[chunk + 1]
@@ -145,21 +154,17 @@ def _fill_chunks(
 
 
 @njit(**COMPILED)
-def _regions(room, begin):
-    """Return where the region of each chunk begins and, last, where the storage ends."""
-    region = np.empty(room.size + 1, np.int64)
-    region[0] = begin
-    for chunk in range(room.size):
-        # 15 % to spare: lists rebuilt in a developing flow then rarely have to be built twice
-        spare = room[chunk] // 7 + 8 if room[chunk] > 0 else 0
-        region[chunk + 1] = region[chunk] + room[chunk] + spare
-    return region
+def _copy_lists(old_start, count, old_entries, start, entries):
+    """Copy the first `count` (superblocks,) entries of each list to its start in `entries`."""
+    for one in range(count.size):
+        for k in range(count[one]):
+            entries[start[one] + k] = old_entries[old_start[one] + k]
 
 
 @njit(**COMPILED)
 def leaves(tree: Tree) -> np.ndarray:
     """Return the node of each block, (blocks,)."""
-    found = np.empty(tree.last[0], np.int64)
+    found = empty(tree.last[0], np.int64)
     for node in range(tree.first.size):
         if tree.first[node] >= 0 and tree.last[node] - tree.first[node] == 1:
             found[tree.first[node]] = node
@@ -193,39 +198,43 @@ class Builder:
         lists are built again.
         """
         number = self.first.size - 1
-        start, count = np.empty(number, np.int64), np.empty(number, np.int64)
+        start, count = np.zeros(number, np.int64), np.zeros(number, np.int64)
         kind = np.int32 if self.images.sign.shape[0] <= SHORT_IMAGES else np.int64
         empty = Lists(self.first, start, count, np.empty(0, kind))
         return self._filled(empty, np.ones(number, np.bool_), room)
 
     def again(self, old: Lists, wanted: np.ndarray) -> Lists:
-        """Return lists of which those of `wanted` (superblocks,) are new.
-
-        The storage of the lists that they replace is not used again before the next full build.
-        """
+        """Return lists of which those of `wanted` (superblocks,) are new."""
         return self._filled(old, wanted, None)[0]
 
     def boxes(self) -> np.ndarray:
         """Return the lower and upper corners of the box of each block, (blocks, 2 D)."""
-        tree = self.tree
-        return np.hstack([tree.lower[self.leaves], tree.upper[self.leaves]])
+        D = self.tree.lower.shape[1]
+        boxes = np.empty((self.leaves.size, 2 * D))
+        boxes[:, :D] = self.tree.lower[self.leaves]
+        boxes[:, D:] = self.tree.upper[self.leaves]
+        return boxes
 
     def _filled(self, old, wanted, room):
         chunks = (wanted.size + CHUNK - 1) // CHUNK
         if room is None or room.size != chunks:
-            room = np.zeros(chunks, np.int64)
+            room = np.zeros(chunks, np.int64)  # the lists are counted before they are written
+        else:  # 15 % to spare: lists rebuilt in a developing flow rarely have to be built twice
+            room = room + room // 7 + 8
         needed = np.empty(chunks, np.int64)
-        begin = old.entries.size
+        kept = np.where(wanted, 0, old.count)
+        start, begin = np.cumsum(kept) - kept, int(kept.sum())
         dim = (0,) * self.images.sign.shape[1]
         while True:
-            region = _regions(room, begin)
+            region = begin + np.append(0, np.cumsum(room))
             entries = np.empty(region[-1], old.entries.dtype)
-            entries[:begin] = old.entries
+            if begin > 0:
+                _copy_lists(old.start, kept, old.entries, start, entries)
             self.team.run(
                 _fill_chunks, chunks, dim, self.tree, self.leaves, self.stretch, self.images,
-                wanted, self.first, region, old.start, old.count, entries, needed,
+                wanted, self.first, region, start, old.count, entries, needed,
                 smallest=max(1, SMALLEST_RANGE // (SUPERBLOCK * CHUNK)),
             )  # fmt: skip
             if (needed <= np.diff(region)).all():
-                return old._replace(entries=entries), needed
+                return old._replace(start=start, entries=entries), needed
             room = needed.copy()

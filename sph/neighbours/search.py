@@ -1,6 +1,6 @@
 """Management of the candidate lists: when to rebuild them, and with which skin."""
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
@@ -21,7 +21,7 @@ GROWTH = 0.05
 BUILD_OVER_PASSES = 0.3
 COPYING = 0.12
 
-# Extent of the region of a list in support diameters: a superblock of 128 particles and H around it.
+# Extent of the region of a list in support diameters: a superblock and H around it.
 WIDTH = 1.8
 
 # Share of superblocks above which all lists are built again instead of those that asked.
@@ -105,7 +105,6 @@ class Search:
         self.lists: lists.Lists | None = None
         self.images: Images | None = None  # of the domain, which the lists refer to
         self.boxes: np.ndarray | None = None  # (blocks, 2 D) of the present positions
-        self._builder: lists.Builder | None = None
         self._room: np.ndarray | None = None  # that each chunk of the lists needed
         self.reach_factor = 0.0  # candidates are complete within this factor of the list support
         self._widenings = 0  # in this step
@@ -153,14 +152,25 @@ class Search:
     def build(self, origin: Origin, identity: np.ndarray) -> None:
         """Build the lists from `origin`, whose arrays are in block order and must not change."""
         self._check_reach(origin, identity)
-        assert self.images is not None
-        self.lists = None  # frees the old lists before the new ones are built
-        boxes = tree.build(origin.position, origin.support)
-        self._builder = lists.Builder(boxes, origin.skin, self.images, self.team)
-        self.lists, self._room = self._builder.all(self._room)
-        self.boxes = self._builder.boxes()
+        self.lists = self.boxes = None  # frees the old lists before the new ones are built
+        builder = self._builder(origin)
+        self.boxes = builder.boxes()
+        self.lists, self._room = builder.all(self._room)
         self.origin = origin
         self.reach_factor = 1.0 + origin.skin
+
+    def forget(self) -> None:
+        """Free the lists and their origin, which are of no use after a change of memory order."""
+        self.lists = self.boxes = self.origin = None
+
+    def _builder(self, origin: Origin) -> lists.Builder:
+        """Return the builder of the lists of `origin`.
+
+        The tree is not kept: the lists need it again only where a support asks for wider ones.
+        """
+        assert self.images is not None
+        boxes = tree.build(origin.position, origin.support)
+        return lists.Builder(boxes, origin.skin, self.images, self.team)
 
     def _check_reach(self, origin: Origin, identity: np.ndarray) -> bool:
         """Set the images that `origin` needs; return whether they changed."""
@@ -175,12 +185,13 @@ class Search:
 
         Lists of other superblocks change only if the larger supports reach them.
         """
-        builder: Any = self._builder  # lists have been built
         assert self.origin is not None
         assert self.lists is not None
         self._widenings += 1
-        asked = wanted > 1.0
-        factor = np.where(asked, wanted * (2.0 if self._widenings > PATIENCE else 1.0), 1.0)
+        asked = wanted > 0.0
+        # where particles have moved, lists reach less far than the supports they are built for
+        growth = (2.0 if self._widenings > PATIENCE else 1.0) / min(self.reach_factor, 1.0)
+        factor = np.where(asked, wanted * growth, 1.0)
         support = self.origin.support * np.repeat(factor, BLOCK)[: identity.size]
         origin = self.origin._replace(support=support)
         changed = self._check_reach(origin, identity)
@@ -192,7 +203,7 @@ class Search:
             self.reach_factor, self.boxes = reach_factor, boxes
             return
         self.origin = origin
-        tree.raise_support(builder.tree, builder.leaves, asked, support)
+        builder = self._builder(origin)
         self.lists = builder.again(self.lists, own)
         reached = lists.listed(self.lists, own)
         self.lists = builder.again(self.lists, reached & ~own)

@@ -6,7 +6,7 @@ byte the one that h5py's `attrs.update`, `create_group` and `create_dataset` wri
 """
 
 import functools
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 
 import h5py
 import numpy as np
@@ -30,15 +30,35 @@ def write_attributes(owner: h5g.GroupID | h5d.DatasetID, attributes: Mapping[str
         attribute.write(data, mtype=in_memory)
 
 
-def write_dataset(
-    group: h5g.GroupID, name: str, array: np.ndarray, chunks: tuple[int, ...] | None = None
-) -> h5d.DatasetID:
-    """A new dataset; with `chunks`, their shape, it is checked when it is read (Fletcher-32)."""
+def write_dataset(group: h5g.GroupID, name: str, array: np.ndarray) -> h5d.DatasetID:
+    """A new dataset."""
     data = np.asarray(array, order="C")
     stored, in_memory = _types(data.dtype)
-    plan = _plan_of_dataset(chunks)
+    plan = _plan_of_dataset(None)
     dataset = h5d.create(group, name.encode(), stored, _space(data.shape), dcpl=plan)
     dataset.write(h5s.ALL, h5s.ALL, data, mtype=in_memory)
+    return dataset
+
+
+def write_checked(
+    group: h5g.GroupID, name: str, part: Callable[[int, int], np.ndarray], number: int, largest: int
+) -> h5d.DatasetID:
+    """A new dataset of `number` rows that is checked when it is read (Fletcher-32).
+
+    part(first, last) returns rows [first, last). A chunk has up to `largest` bytes. Chunks are
+    asked for and written one after another, so that all rows never exist at once.
+    """
+    row = part(0, 1)
+    chunk = (min(number, largest // row.nbytes), *row.shape[1:])
+    stored, in_memory = _types(row.dtype)
+    space = h5s.create_simple((number, *row.shape[1:]))
+    plan = _plan_of_dataset(chunk)
+    dataset = h5d.create(group, name.encode(), stored, space, dcpl=plan, dapl=_uncached())
+    for first in range(0, number, chunk[0]):
+        data = np.asarray(part(first, min(first + chunk[0], number)), order="C")
+        space.select_hyperslab((first, *(0 for _ in row.shape[1:])), data.shape)
+        dataset.write(_space(data.shape), space, data, mtype=in_memory)
+        del data  # before the next part exists
     return dataset
 
 
@@ -60,6 +80,14 @@ def _types(kind: np.dtype) -> tuple[h5t.TypeID, h5t.TypeID]:
 def _text_types() -> tuple[h5t.TypeID, h5t.TypeID]:
     """Of str, which NumPy holds as objects."""
     return _types.__wrapped__(TEXT)
+
+
+@functools.cache
+def _uncached() -> h5p.PropDAID:
+    """The access to a dataset that writes each chunk at once; HDF5 would keep 8 MB in memory."""
+    access = h5p.create(h5p.DATASET_ACCESS)
+    access.set_chunk_cache(1, 0, 1.0)
+    return access
 
 
 @functools.lru_cache(64)

@@ -1,4 +1,4 @@
-"""Instructions on copied blocks, in which the quantities follow one another, BLOCK numbers each."""
+"""Instructions on copied blocks: for each quantity BLOCK numbers, one after another."""
 
 from numba import types
 

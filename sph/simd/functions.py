@@ -1,4 +1,4 @@
-"""The NumPy functions that vectors have, with the intrinsics of LLVM for them.
+"""The functions of NumPy that vectors have (`sph.simd`), and their names in LLVM.
 
 Methods of models may use these functions, np.where, abs, + - * / **, comparisons, & | ^ ~ of these,
 and `larger` and `smaller` of `sph.compiled`.
@@ -14,4 +14,8 @@ UNARY: dict[Any, str] = {
     np.cos: "llvm.cos", np.tan: "llvm.tan", np.tanh: "llvm.tanh", np.floor: "llvm.floor",
     np.ceil: "llvm.ceil",
 }  # fmt: skip
-BINARY: dict[Any, str] = {np.maximum: "llvm.maxnum", np.minimum: "llvm.minnum", np.power: "llvm.pow"}
+BINARY: dict[Any, str] = {
+    np.maximum: "llvm.maxnum",
+    np.minimum: "llvm.minnum",
+    np.power: "llvm.pow",
+}

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from test_neighbours import EagerTeam, positions, search_over
 
-from sph import config
+from sph import config, simd
 from sph.passes import Neighbours
 from sph.passes.nearest import nearest
 from sph.warnings import PAIRED
@@ -15,13 +15,14 @@ MIXED = ("mirror", "periodic", "open")
 def found_by_pass(search, position, support, mass, density, threads=1):
     """(N,) what the pass finds, particles in block order."""
     dim = (0,) * position.shape[0]
-    lists = Neighbours(
-        search.lists, search.domain.images, search.origin.support, search.reach_factor
-    )
+    near = Neighbours(
+        search.lists, search.images, search.boxes, search.origin.support, search.reach_factor,
+        simd.DOUBLE,
+    )  # fmt: skip
     ratio = np.full(support.size, np.nan)
     team = EagerTeam(threads)
     fields = (position, support, mass, density, ratio)
-    team.run(nearest, search.lists.start.size, dim, None, lists, *fields)
+    team.run(nearest, near.superblocks, dim, None, near, *fields)
     team.close()
     return ratio
 
@@ -52,7 +53,7 @@ def test_nearest_distance_is_minimum_over_all_pairs(boundaries, shape, threads):
     support = random.uniform(0.002, 0.3, 203)
     mass, density = random.uniform(0.5, 2.0, (2, 203))
     search, order = search_over(boundaries, position, support, 0.2)
-    gas = (position[:, order], support[order], mass[order], density[order])
+    gas = (search.origin.position, support[order], mass[order], density[order])
     expected = found_densely(search.domain, *gas)
     ratio = found_by_pass(search, *gas, threads)
     # differences of coordinates up to 2 are rounded to 2e-16: nothing to distances of 1e-4
@@ -75,8 +76,8 @@ def test_nearest_distance_includes_own_images():
 def test_nearest_distance_two_threads_equal_one():
     position = positions("clustered", 3, 3000)
     support = np.full(3000, 0.05)
-    search, order = search_over(MIXED, position, support, 0.2)
-    gas = (position[:, order], support, np.ones(3000), np.ones(3000))
+    search, _ = search_over(MIXED, position, support, 0.2)
+    gas = (search.origin.position, support, np.ones(3000), np.ones(3000))
     one, two = (found_by_pass(search, *gas, threads) for threads in (1, 2))
     assert one.tobytes() == two.tobytes()
 

@@ -75,8 +75,8 @@ def test_preview_memory_counts_particles_and_lists(simulation):
     simulation.particles.alpha = np.zeros(1000)
     assert preview.bytes_held(simulation) == held + 8000
     lists = simulation.search.lists
-    longer = np.zeros(lists.candidates.size + 1000, lists.candidates.dtype)
-    simulation.search.lists = lists._replace(candidates=longer)
+    longer = np.zeros(lists.entries.size + 1000, lists.entries.dtype)
+    simulation.search.lists = lists._replace(entries=longer)
     assert preview.bytes_held(simulation) == held + 8000 + 1000 * longer.itemsize
 
 

@@ -51,7 +51,7 @@ class Counted:
         return self._of("add", other - self.value)
 
     def __ge__(self, other):
-        return self.value >= other.value
+        return self.value >= getattr(other, "value", other)
 
     __radd__, __rmul__ = __add__, __mul__
 
@@ -66,15 +66,15 @@ def test_kernel_operations_of_the_roofline_are_those_of_the_kernel(roofline):
     """Each fused multiply-add is an addition and a multiplication of the formula."""
     kernel, dim = WendlandC2(), (0, 0, 0)
     w = counted(lambda q: kernel.w(dim, q))
-    # without q = r/H, 0 q (the zero of the minimum) and the second u u, which the compiler shares
+    # without q = r/H and the second u u, which the compiler shares
     ours = roofline.total(roofline.Q_AND_U, roofline.W)
     assert w["add"] == ours.adds + ours.fused
-    assert w["multiply"] - 2 == ours.multiplies - 1 + ours.fused
+    assert w["multiply"] - 1 == ours.multiplies - 1 + ours.fused
     slope = counted(lambda q: kernel.dw_over_q(dim, q))
     ours = roofline.total(roofline.Q_AND_U, roofline.U_CUBED)
     assert slope["add"] == ours.adds
     # also without the factor -20, which is multiplied into a factor outside the loop
-    assert slope["multiply"] - 2 == ours.multiplies - 1
+    assert slope["multiply"] - 1 == ours.multiplies - 1
 
 
 def test_bounds_follow_from_the_counts(roofline):

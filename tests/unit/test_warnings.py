@@ -178,10 +178,11 @@ KEPT = {
 class FakeSimulation:
     """What a warning looks at of a simulation, and nothing amiss in it."""
 
-    def __init__(self, limits=None, swamped=None):
+    def __init__(self, limits=None, swamped=None, precision="double"):
         self.held_supports = 0
         self.max_support, self.number = 0.125, 40
-        self.scene = self.config = self.problem = self.particles = self
+        self.scene = self.config = self.problem = self.particles = self.run = self
+        self.precision = precision
         self.swamped = swamped or {}
         self.allowed = lambda: limits or {}
 
@@ -221,6 +222,14 @@ def kinds_of(monkeypatch):
 )
 def test_conserved_quantity_beyond_bound_warns(kinds_of, kept, expected):
     assert kinds_of(kept) == expected
+
+
+def test_momentum_in_single_precision_has_limit_of_its_own(kinds_of):
+    limits = {"momentum_change": Limit(1e-12, "only round-off")}
+    single = {"limits": limits, "precision": "single"}
+    assert kinds_of({"momentum_change": 0.9e-6}, limits=limits) == ["limit"]
+    assert kinds_of({"momentum_change": 0.9e-4}, **single) == []
+    assert kinds_of({"momentum_change": 1.1e-4}, **single) == ["momentum"]
 
 
 def test_nearest_neighbour_below_half_spacing_warns_of_pairs(kinds_of):

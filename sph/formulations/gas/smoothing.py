@@ -1,11 +1,11 @@
 """Support radius H and density of a particle from its neighbours (step 2).
 
 Both methods use the distances and weights (by default masses, see `weighting`) of the n candidates
-of a particle, which are rows of the array `pairs`, in any units. They return (H, sum of weights,
-Omega, wanted); with masses as weights the sum is the density rho. The candidates are complete up to
-the radius `reach`. If H exceeds `reach`, `wanted` is the radius that the candidates must reach
-before the next attempt; otherwise it is 0.0. If there is no root up to `largest`, H is `largest`
-and Omega is 1, because H does not depend on the density.
+of a particle, which are rows of the array `pairs` from the row `row`, in any units. They return
+(H, sum of weights, Omega, wanted); with masses as weights the sum is the density rho. The
+candidates are complete up to the radius `reach`. If H exceeds `reach`, `wanted` is the radius that
+the candidates must reach before the next attempt; otherwise it is 0.0. If there is no root up to
+`largest`, H is `largest` and Omega is 1, because H does not depend on the density.
 """
 
 from typing import NamedTuple
@@ -17,8 +17,8 @@ from sph.compiled import INLINED
 from sph.kernels import dw_over_q, normalisation, w
 from sph.simd import filled, inverse_cbrt, lane_sum, load, width
 
-# Rows of `pairs`.
-R, WEIGHT = 0, 1
+# Rows of `pairs`, which has ROWS for each particle: distance, weight, others of the density pass.
+R, WEIGHT, ROWS = 0, 1, 7
 
 # Each pass of eqs 7 and 15 multiplies the distance from their common root by 1 - Omega. In resolved
 # flow the passes converge to within one per cent. They diverge if Omega exceeds 2, at jumps of mass
@@ -52,20 +52,20 @@ def _per_spacing(dim, number):
 
 
 @njit(**INLINED)
-def _sums(lanes, kernel, dim, pairs, n, H_inv):
+def _sums(lanes, kernel, dim, pairs, row, n, H_inv):
     """Return the sums of m w(q) and m q^2 (dw/dq)/q over candidates."""
     sum_w = filled(lanes, 0.0)
     sum_dw = filled(lanes, 0.0)
     for k in range(0, n, width(lanes)):
-        q = load(lanes, pairs, (R, k)) * H_inv
-        m_k = load(lanes, pairs, (WEIGHT, k))
+        q = load(lanes, pairs, (row + R, k)) * H_inv
+        m_k = load(lanes, pairs, (row + WEIGHT, k))
         sum_w += m_k * w(kernel, dim, q)
         sum_dw += m_k * (q * q) * dw_over_q(kernel, dim, q)
     return lane_sum(sum_w), lane_sum(sum_dw)
 
 
 @njit(**INLINED)
-def find_support(smoothing, lanes, kernel, dim, pairs, n, mass, H, ratio, reach, largest):
+def find_support(smoothing, lanes, kernel, dim, pairs, row, n, mass, H, ratio, reach, largest):
     """Return (H, sum of weights, Omega, wanted) by the method of `smoothing`."""
     C = normalisation(kernel, dim)
     D = len(dim)
@@ -80,11 +80,11 @@ def find_support(smoothing, lanes, kernel, dim, pairs, n, mass, H, ratio, reach,
         if index < smoothing.passes - 1:
             total = filled(lanes, 0.0)
             for k in range(0, n, width(lanes)):
-                m, r = load(lanes, pairs, (WEIGHT, k)), load(lanes, pairs, (R, k))
+                m, r = load(lanes, pairs, (row + WEIGHT, k)), load(lanes, pairs, (row + R, k))
                 total += m * w(kernel, dim, r * H_inv)
             sum_w = lane_sum(total)
         else:
-            sum_w, sum_dw = _sums(lanes, kernel, dim, pairs, n, H_inv)
+            sum_w, sum_dw = _sums(lanes, kernel, dim, pairs, row, n, H_inv)
             Omega = -sum_dw / (D * sum_w)  # eq 8 with eqs 7 and 10: the D w terms cancel the 1
         rho = C * H_inv**D * sum_w  # eq 7
         before = H_inv
@@ -94,13 +94,13 @@ def find_support(smoothing, lanes, kernel, dim, pairs, n, mass, H, ratio, reach,
         H = 1.0 / H_inv
         return H, rho, Omega, (0.0 if reach >= H else H)
     return _solve(
-        lanes, kernel, dim, pairs, n, mass, 1.0 / before, ratio, reach, largest,
+        lanes, kernel, dim, pairs, row, n, mass, 1.0 / before, ratio, reach, largest,
         smoothing.tolerance,
     )  # fmt: skip
 
 
 @njit(**INLINED)
-def _solve(lanes, kernel, dim, pairs, n, mass, H, ratio, reach, largest, tolerance):
+def _solve(lanes, kernel, dim, pairs, row, n, mass, H, ratio, reach, largest, tolerance):
     """Return the root of eqs 7 and 15 by Newton's iteration, safeguarded by bisection."""
     C = normalisation(kernel, dim)
     D = len(dim)
@@ -111,7 +111,7 @@ def _solve(lanes, kernel, dim, pairs, n, mass, H, ratio, reach, largest, toleran
         if not reach >= H:
             return H, 0.0, 0.0, H
         H_inv = 1.0 / H
-        sum_w, sum_dw = _sums(lanes, kernel, dim, pairs, n, H_inv)
+        sum_w, sum_dw = _sums(lanes, kernel, dim, pairs, row, n, H_inv)
         if sum_w < target:  # sum m w(r/H) rises with H
             lower = H
             if not largest > H:

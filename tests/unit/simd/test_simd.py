@@ -11,7 +11,7 @@ from lanes import LANES, compiled, every_lanes, precision
 
 from sph import compiled as of_sph
 from sph import simd
-from sph.simd.memory import CACHE_LINE
+from sph.arrays import CACHE_LINE
 
 N = 32  # a multiple of all widths
 EXPRESSIONS = [
@@ -94,6 +94,15 @@ def test_operations_of_different_widths_are_refused():
 
 
 # --- memory ---
+
+
+@pytest.mark.parametrize("call", ["load(DOUBLE, a, (0, 0))", "at((0, 0), a, 0)"])
+def test_arrays_in_another_order_are_refused(call):
+    run = compiled(f"def run(a):\n    {call}")
+    run(np.zeros((2, 8)))
+    for a in (np.zeros((2, 8), order="F"), np.zeros((2, 16))[:, ::2]):
+        with pytest.raises(Exception, match="expected an array in C order"):
+            run(a)
 
 
 @every_lanes
