@@ -311,3 +311,27 @@ def test_other_instructions_pass_the_same_tests(name):
         env=os.environ | PROCESSORS[name], capture_output=True, text=True, check=True,
     )  # fmt: skip
     assert chosen.stdout.strip() == ("avx2" if name == "avx2" else "")
+
+
+TUBE = '[problem]\nname = "shock_tube"\nn = 60\n[time]\nend = 0.02\n[output]\ninterval = 0.01\n'
+
+
+@pytest.mark.slow
+def test_restart_with_other_instructions_names_them(tmp_path):
+    """Bits differ between processors; a restart says so."""
+    (tmp_path / "tube.toml").write_text(TUBE)
+    run, other = tmp_path / "run", tmp_path / "other"
+
+    def sph_(environment, *arguments):
+        found = subprocess.run(
+            [sys.executable, "-m", "sph", *map(str, arguments)],
+            env=os.environ | environment, capture_output=True, text=True, timeout=300, check=True,
+        )  # fmt: skip
+        return found.stderr
+
+    sph_({}, "run", tmp_path / "tube.toml", "-o", run)
+    source = run / "checkpoints" / "checkpoint_000001.h5"
+    assert "digits" not in sph_({}, "restart", source, "-o", tmp_path / "same")
+    said = sph_(PROCESSORS["generic"], "restart", source, "-o", other)
+    assert "may differ in their last digits" in said
+    assert "NUMBA_CPU_NAME (None, here generic)" in said
