@@ -46,7 +46,7 @@ def rates(case, lists, lanes):
 
 
 @pytest.mark.parametrize(
-    "case", slow_except({0}, [engine.CASES[k] for k in (17, 8, 22, 24, 33, 37)]), ids=str
+    "case", slow_except({0}, [engine.CASES[k] for k in (8, 22, 33)]), ids=str
 )
 def test_one_lane_matches_transcription_and_vectors(case):
     _, found, errors, expected = rates(case, "reused", simd.SCALAR)
@@ -61,7 +61,7 @@ def test_one_lane_matches_transcription_and_vectors(case):
 
 
 @pytest.mark.parametrize("lists", ["fresh", "reused", "widened"])
-@pytest.mark.parametrize("case", slow_except({8}, engine.CASES), ids=str)
+@pytest.mark.parametrize("case", slow_except({2}, engine.CASES[::4]), ids=str)
 def test_single_precision_matches_transcription(case, lists):
     _, _, errors, expected = rates(case, lists, simd.SINGLE)
     box = np.ptp(case.box, axis=1).max()
