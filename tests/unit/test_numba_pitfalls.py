@@ -208,6 +208,7 @@ def test_compiled_functions_share_their_flags_and_are_all_cached():
         given = {k: v for k, v in function.targetoptions.items() if k not in plain}
         if function.stats.cache_path is not None:  # the others are cached with their callers
             given["cache"] = True
+        given["pipeline_class"] = function._compiler.pipeline_class
         assert given in allowed, name
         # neither the cache nor its key sees through a function that is closed over
         assert function.py_func.__closure__ is None, name
