@@ -318,19 +318,21 @@ def test_widening_extends_requesting_blocks_and_keeps_others(boundaries, asking,
     assert not search.stale(x, asked)
 
 
-def test_widening_renews_only_lists_that_ask_or_are_reached(full_builds):
+def test_widening_renews_only_lists_that_ask_or_are_reached(full_builds, monkeypatch):
+    again, wanted_again = lists.Builder.again, []
+    monkeypatch.setattr(
+        lists.Builder, "again", lambda *a: wanted_again.append(a[2].copy()) or again(*a)
+    )
     position, support = positions("random", 2, 4000), np.full(4000, 0.02)
     search, _ = search_over(("periodic", "mirror"), position, support, 0.1)
-    before, old = search.lists._replace(start=search.lists.start.copy()), entries(search)
+    first, old = search.lists.first, entries(search)
     wanted = np.zeros(order.number_of_blocks(4000))
     wanted[[100, 300]] = 2.0
     search.widen(wanted, np.arange(4000))
-    own = np.searchsorted(before.first, [100, 300], side="right") - 1
+    own = np.searchsorted(first, [100, 300], side="right") - 1
     new = entries(search)
-    reached = {
-        int(one) for k in own for one in np.searchsorted(before.first, new[k][0], side="right") - 1
-    }
-    renewed = set(np.flatnonzero(search.lists.start != before.start))
+    reached = {k for one in own for k in np.searchsorted(first, new[one][0], side="right") - 1}
+    renewed = set(np.flatnonzero(np.any(wanted_again, axis=0)))
     assert renewed == reached | set(own)
     assert len(renewed) < 0.4 * len(new)
     assert len(full_builds) == 1

@@ -206,6 +206,7 @@ def test_compiled_functions_share_their_flags_and_are_all_cached():
         allowed += [ROUNDED] * name.startswith("sph.integrators.leapfrog.")
         allowed += [driver.OPTIONS, driver.HELPER] * name.startswith("sph.steps.driver.")
         given = {k: v for k, v in function.targetoptions.items() if k not in plain}
+        given["pipeline_class"] = function._compiler.pipeline_class
         if function.stats.cache_path is not None:  # the others are cached with their callers
             given["cache"] = True
         given["pipeline_class"] = function._compiler.pipeline_class
