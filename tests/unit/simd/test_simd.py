@@ -293,8 +293,8 @@ AVX2 = {"NUMBA_CPU_NAME": "haswell", "NUMBA_CPU_FEATURES": "+avx2,+fma,+bmi,+bmi
 PROCESSORS = {"avx2": AVX2, "generic": {"NUMBA_CPU_NAME": "generic"}}
 
 
-# of the engine one case, since every one is compiled anew
-CHOSEN = "not threads and (test_simd or test_spatial or (2d-mirror-mirror and fresh))"
+# what the instructions of a processor decide; of the engine one case, since each is compiled anew
+CHOSEN = "partial or come_to_the_front or inverse or columns or (2d-mirror-mirror and fresh)"
 
 
 @pytest.mark.slow
