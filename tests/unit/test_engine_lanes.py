@@ -45,9 +45,7 @@ def rates(case, lists, lanes):
     return gas, found, errors, expected
 
 
-@pytest.mark.parametrize(
-    "case", slow_except({0}, [engine.CASES[k] for k in (8, 22, 33)]), ids=str
-)
+@pytest.mark.parametrize("case", slow_except({0}, [engine.CASES[k] for k in (8, 22, 33)]), ids=str)
 def test_one_lane_matches_transcription_and_vectors(case):
     _, found, errors, expected = rates(case, "reused", simd.SCALAR)
     for name, error in errors.items():
