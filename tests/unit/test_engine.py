@@ -270,7 +270,7 @@ def run_engine(case, gas, skin, threads, lanes=simd.DOUBLE):
     models = scene.formulation.models._replace(smoothing=case.smoothing)
     sweep = passes.Sweep(state, team, ordering.number_of_blocks(count), models)
     sweep.dt = STEP
-    sweep.wanted.fill(np.nan)
+    sweep.wanted.fill(1.0)
     density, *others = scene.passes
     forget(density, state)
     widenings = -1
