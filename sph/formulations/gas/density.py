@@ -89,7 +89,7 @@ def density(
     members, n = empty(BLOCK, np.int64), empty(BLOCK, np.int64)
     for superblock in range(first, last):
         begin, end = lists.first[superblock], lists.first[superblock + 1]
-        if not largest_of(wanted, begin, end) > 0.0:
+        if not _any(wanted, begin, end):
             continue
         i_0, i_end = begin * BLOCK, min(end * BLOCK, mass.size)
         x_0, v_0 = middle(dim, neighbours, begin, end), at(dim, velocity, i_0)
@@ -190,6 +190,15 @@ def density(
                 lanes, models, block, energy, support, rho, Omega, div_v, curl_v, alpha,
                 energy_shift, pressure, pressure_term, sound_speed, balsara, alpha_rate,
             )  # fmt: skip
+
+
+@njit(**INLINED)
+def _any(wanted, first, last):
+    """Return whether one of the blocks [first, last) is wanted."""
+    found = False
+    for block in range(first, last):
+        found = found or wanted[block] != 0.0
+    return found
 
 
 @njit(**INLINED)
