@@ -318,10 +318,17 @@ def test_widening_extends_requesting_blocks_and_keeps_others(boundaries, asking,
     assert not search.stale(x, asked)
 
 
-def test_widening_renews_only_lists_that_ask_or_are_reached(full_builds):
+def test_widening_renews_only_lists_that_ask_or_are_reached(full_builds, monkeypatch):
+    renewals, again = [], lists.Builder.again
+
+    def watched(self, old, wanted):
+        renewals.append(np.flatnonzero(wanted))
+        return again(self, old, wanted)
+
+    monkeypatch.setattr(lists.Builder, "again", watched)
     position, support = positions("random", 2, 4000), np.full(4000, 0.02)
     search, _ = search_over(("periodic", "mirror"), position, support, 0.1)
-    before, old = search.lists._replace(start=search.lists.start.copy()), entries(search)
+    before, old = search.lists, entries(search)
     wanted = np.zeros(order.number_of_blocks(4000))
     wanted[[100, 300]] = 2.0
     search.widen(wanted, np.arange(4000))
@@ -330,10 +337,11 @@ def test_widening_renews_only_lists_that_ask_or_are_reached(full_builds):
     reached = {
         int(one) for k in own for one in np.searchsorted(before.first, new[k][0], side="right") - 1
     }
-    renewed = set(np.flatnonzero(search.lists.start != before.start))
+    renewed = set(np.concatenate(renewals))
     assert renewed == reached | set(own)
     assert len(renewed) < 0.4 * len(new)
     assert len(full_builds) == 1
+    assert search.lists.entries.size == search.lists.count.sum()  # no gaps where old lists were
     for k in set(range(len(new))) - renewed:
         np.testing.assert_array_equal(new[k], old[k])
     # and what is renewed is what a build for these supports gives
