@@ -7,11 +7,14 @@ from typing import Any, TypeVar
 import numpy as np
 from llvmlite import ir
 from numba import types
-from numba.extending import intrinsic, overload
+from numba.core.typing.templates import AbstractTemplate, infer_global, signature
+from numba.extending import intrinsic, lower_builtin, overload
 
-from sph import compile_cache
+from sph import compile_cache, lean_compiler
+from sph.lean_compiler import Lean
 
 compile_cache.install()
+lean_compiler.install()
 
 # Without "nnan" and "ninf": those would let the compiler remove every test for a non-finite number.
 FASTMATH = {"nsz", "arcp", "contract", "afn", "reassoc"}
@@ -19,20 +22,20 @@ FASTMATH = {"nsz", "arcp", "contract", "afn", "reassoc"}
 # NumPy's error model: with Python's check for division by zero no loop would vectorise.
 FLAGS: dict[str, Any] = {"fastmath": FASTMATH, "error_model": "numpy"}
 
-# Without this, Numba adds to each function a wrapper for callers from C. There are none.
-_NO_C: dict[str, Any] = {"no_cfunc_wrapper": True}
+# Numba adds to each function a wrapper for callers from C. There are none.
+LEAN: dict[str, Any] = {"no_cfunc_wrapper": True, "pipeline_class": Lean}
 
 # Options of every compiled function: @njit(**COMPILED). None is compiled with parallel=True: passes
 # release the interpreter's lock and run over ranges of blocks on Python threads (sph/threads.py),
 # which costs no second compilation and takes nested models.
-COMPILED: dict[str, Any] = {"cache": True, "nogil": True, **FLAGS, **_NO_C}
+COMPILED: dict[str, Any] = {"cache": True, "nogil": True, **FLAGS, **LEAN}
 
 
 # For functions with floating-point sums that other compiled functions call. A function that is not
 # inlined exists in two compiled copies, which may round differently: the process that compiles the
 # caller uses one copy, and a process that finds the caller in the cache uses the other. Python
 # cannot call them: the wrapper for that would hold the code a second time.
-INLINED: dict[str, Any] = {**FLAGS, **_NO_C, "forceinline": True, "no_cpython_wrapper": True}
+INLINED: dict[str, Any] = {**FLAGS, **LEAN, "forceinline": True, "no_cpython_wrapper": True}
 
 
 Verb = TypeVar("Verb", bound=Callable[..., Any])
@@ -67,36 +70,9 @@ def verb(stub: Verb) -> Verb:
     return stub
 
 
-def _fast_binary(llvm_name: str):
-    """An intrinsic for llvm.maxnum or llvm.minnum with all fast flags.
-
-    Python's max() carries rules for NaN that stop LLVM from vectorising a reduction over it.
-    """
-
-    @intrinsic
-    def operation(typingctx, a, b):
-        common = typingctx.unify_types(a, b)
-        if not isinstance(common, types.Float):
-            return None
-
-        def generate(context, builder, signature, arguments):
-            arguments = [
-                context.cast(builder, value, given, common)
-                for value, given in zip(arguments, signature.args, strict=True)
-            ]
-            kind = arguments[0].type
-            function = builder.module.declare_intrinsic(
-                llvm_name, [kind], ir.FunctionType(kind, [kind, kind])
-            )
-            return builder.call(function, arguments, fastmath=("fast",))
-
-        return common(a, b), generate
-
-    return operation
-
-
-_maxnum = _fast_binary("llvm.maxnum")
-_minnum = _fast_binary("llvm.minnum")
+def instruction(emit) -> Any:
+    """Make a function that returns (signature, LLVM code) one that compiled code can call."""
+    return intrinsic(emit)
 
 
 def larger(a, b):
@@ -109,15 +85,29 @@ def smaller(a, b):
     return np.minimum(a, b)
 
 
-def _are_numbers(*kinds):
-    return all(isinstance(one, types.Number | types.Boolean) for one in kinds)
+def _extremum(function, llvm_name):
+    """Define function(a, b) of two numbers by llvm.maxnum or llvm.minnum, with all fast flags.
+
+    Python's max() carries rules for NaN that stop LLVM from vectorising a reduction over it.
+    """
+
+    @infer_global(function)
+    class Typed(AbstractTemplate):
+        def generic(self, arguments, keywords):
+            numbers = [one for one in arguments if isinstance(one, types.Number | types.Boolean)]
+            if len(arguments) == len(numbers) == 2 and not keywords:
+                kind = self.context.unify_types(*numbers)
+                return signature(kind, kind, kind) if isinstance(kind, types.Float) else None
+            return None
+
+    @lower_builtin(function, types.Float, types.Float)
+    def lower(context, builder, sig, arguments):
+        kind = arguments[0].type
+        of_two = builder.module.declare_intrinsic(
+            llvm_name, [kind], ir.FunctionType(kind, [kind, kind])
+        )
+        return builder.call(of_two, arguments, fastmath=("fast",))
 
 
-@overload(larger, jit_options=FLAGS)  # type: ignore[arg-type]
-def _larger(a, b):
-    return (lambda a, b: _maxnum(a, b)) if _are_numbers(a, b) else None
-
-
-@overload(smaller, jit_options=FLAGS)  # type: ignore[arg-type]
-def _smaller(a, b):
-    return (lambda a, b: _minnum(a, b)) if _are_numbers(a, b) else None
+_extremum(larger, "llvm.maxnum")
+_extremum(smaller, "llvm.minnum")

@@ -112,7 +112,9 @@ def drift_remedy(simulation) -> str:
 
 def of_numbers(simulation) -> str:
     """Return what to try if values are not finite; smaller steps can help only after the start."""
-    return smaller_steps(simulation) if simulation.step else NEARER_UNITS
+    remedy = smaller_steps(simulation) if simulation.step else NEARER_UNITS
+    wider = 'run.precision = "double", whose numbers have a wider range, or '
+    return wider * simulation.scene.is_single + remedy
 
 
 def fault_of(simulation, name: str, values, bad, remedy: str) -> NumericalError:

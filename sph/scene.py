@@ -44,7 +44,12 @@ class Scene:
     @property
     def lanes(self):
         """The arithmetic of sums over neighbours, see `sph.simd`."""
-        return simd.SINGLE if self.config.run.precision == "single" else simd.DOUBLE
+        return simd.SINGLE if self.is_single else simd.DOUBLE
+
+    @property
+    def is_single(self) -> bool:
+        """Whether sums over neighbours are in single precision."""
+        return self.config.run.precision == "single"
 
     @cached_property
     def parts(self) -> tuple[Part, ...]:

@@ -13,6 +13,7 @@ apart; in smooth flow this is true of the root.
 import numpy as np
 from numba import njit
 
+from sph.arrays import empty
 from sph.compiled import COMPILED, INLINED, larger, smaller
 from sph.domain import Images
 from sph.neighbours import tree
@@ -82,7 +83,7 @@ def _walk(boxes, motion, position, moves, support, identity, images, reached):
     n = support.size
     first, last = boxes.first, boxes.last
     best, particle = 1.0, 0
-    stack = np.empty((STACK, 3), np.int64)
+    stack = empty((STACK, 3), np.int64)
     depth = 0
     for image in range(images.sign.shape[0] - 1, -1, -1):
         stack[depth] = 0, 0, image

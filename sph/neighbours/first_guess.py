@@ -3,6 +3,7 @@
 import numpy as np
 from numba import njit
 
+from sph.arrays import empty
 from sph.compiled import COMPILED, INLINED, larger, smaller
 from sph.neighbours import BALL, tree
 from sph.neighbours.order import BLOCK
@@ -34,8 +35,8 @@ def from_spacing(position: np.ndarray, ratio: float) -> np.ndarray:
 def _from_spacing(boxes, ratio, guess):
     n = guess.size
     nodes, D = boxes.lower.shape
-    spacings = np.empty(nodes)
-    extent = np.empty(D)
+    spacings = empty(nodes, np.float64)
+    extent = empty(D, np.float64)
     for node in range(nodes):
         count = min(boxes.last[node] * BLOCK, n) - boxes.first[node] * BLOCK
         spacings[node] = np.inf
@@ -84,7 +85,7 @@ def trim(position: np.ndarray, ratio: float, least: float, guess: np.ndarray) ->
 @njit(**COMPILED)
 def _trim(boxes, position, most, least, guess):
     D, n = position.shape
-    centre = np.empty(D)
+    centre = empty(D, np.float64)
     for leaf in range(boxes.first.size):
         if boxes.last[leaf] - boxes.first[leaf] != 1:
             continue
@@ -106,7 +107,7 @@ def _held(boxes, position, centre, radius, enough):
     """Return the number of particles in a ball, counted until it exceeds `enough`."""
     D, n = position.shape
     held = 0
-    stack = np.empty(128, np.int64)
+    stack = empty(128, np.int64)
     stack[0] = 0
     depth = 1
     while depth > 0 and not held > enough:

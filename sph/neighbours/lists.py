@@ -12,6 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
+from sph.arrays import empty
 from sph.compiled import COMPILED, INLINED
 from sph.domain import Images
 from sph.neighbours.order import BLOCK
@@ -35,11 +36,10 @@ class Lists(NamedTuple):
 
 
 @njit(**COMPILED)
-def superblocks(tree: Tree) -> np.ndarray:
-    """Return the first block of each superblock, in order, and the number of blocks."""
+def _superblocks(tree: Tree, found: np.ndarray) -> int:
+    """Write the first block of each superblock, in order, to `found`; return how many there are."""
     first, last = tree.first, tree.last
-    found = np.empty(last[0] + 1, np.int64)
-    stack = np.empty(128, np.int64)
+    stack = empty(128, np.int64)
     stack[0] = 0
     depth, number = 1, 0
     while depth > 0:
@@ -52,8 +52,14 @@ def superblocks(tree: Tree) -> np.ndarray:
             stack[depth] = 2 * node + 2
             stack[depth + 1] = 2 * node + 1
             depth += 2
-    found[number] = last[0]
-    return found[: number + 1].copy()
+    return number
+
+
+def superblocks(tree: Tree) -> np.ndarray:
+    """Return the first block of each superblock, in order, and the number of blocks."""
+    blocks = tree.last[0]
+    found = np.empty(blocks, np.int64)
+    return np.append(found[: _superblocks(tree, found)], blocks)
 
 
 @njit(**INLINED)
@@ -78,8 +84,8 @@ def _fill(superblock, dim, tree, leaf, stretch, images, first, entries, begin, r
     node_first, node_last, lower, upper, largest = tree
     sign, offset = images
     a, b = first[superblock], first[superblock + 1]
-    stack = np.empty(128, np.int64)
-    own_lower, own_upper = np.empty((1, len(dim))), np.empty((1, len(dim)))
+    stack = empty(128, np.int64)
+    own_lower, own_upper = empty((1, len(dim)), np.float64), empty((1, len(dim)), np.float64)
     H = 0.0
     for block in range(a, b):
         H = max(H, largest[leaf[block]])
@@ -170,7 +176,7 @@ def _regions(room, begin, is_estimate):
 @njit(**COMPILED)
 def leaves(tree: Tree) -> np.ndarray:
     """Return the node of each block, (blocks,)."""
-    found = np.empty(tree.last[0], np.int64)
+    found = empty(tree.last[0], np.int64)
     for node in range(tree.first.size):
         if tree.first[node] >= 0 and tree.last[node] - tree.first[node] == 1:
             found[tree.first[node]] = node

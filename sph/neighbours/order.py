@@ -11,6 +11,7 @@ import math
 import numpy as np
 from numba import njit
 
+from sph.arrays import empty
 from sph.compiled import COMPILED, INLINED
 from sph.threads import CHUNK, SMALLEST_RANGE, Team
 
@@ -95,7 +96,7 @@ def _split(first, last, position, identity, order, key, edges, depth):
     Node k of a level covers the blocks [edges[k], edges[k + 1]).
     """
     n = order.size
-    stack = np.empty((64, 3), np.int64)  # of nodes: first block, last block, depth
+    stack = empty((64, 3), np.int64)  # of nodes: first block, last block, depth
     for node in range(first, last):
         # not stack[0] = ..., whose conversion of a tuple to an array takes seconds to compile
         stack[0, 0], stack[0, 1], stack[0, 2] = edges[node], edges[node + 1], depth

@@ -5,6 +5,7 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
+from sph.arrays import empty
 from sph.compiled import COMPILED
 from sph.neighbours.order import BLOCK
 
@@ -28,11 +29,13 @@ def build(position: np.ndarray, support: np.ndarray) -> Tree:
     while (1 << depth) < blocks:
         depth += 1
     nodes = (1 << (depth + 1)) - 1
-    first = np.full(nodes, -1)
-    last = np.full(nodes, -1)
-    lower = np.empty((nodes, D))
-    upper = np.empty((nodes, D))
-    largest = np.empty(nodes)
+    first = empty(nodes, np.int64)
+    last = empty(nodes, np.int64)
+    lower = empty((nodes, D), np.float64)
+    upper = empty((nodes, D), np.float64)
+    largest = empty(nodes, np.float64)
+    for k in range(nodes):  # not np.full, which takes longer to compile
+        first[k], last[k] = -1, -1
     first[0], last[0] = 0, blocks
     for k in range(nodes):
         if last[k] - first[k] > 1:

@@ -7,7 +7,7 @@ middle, so that a slice through the middle of the box finds them.
 
 from collections.abc import Callable, Iterator, Mapping
 from functools import partial
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import h5py
 import numpy as np
@@ -117,7 +117,8 @@ def _fields(checkpoint, frame: Frame) -> Iterator[tuple[Public, np.ndarray, Rows
     for field in particles.fields:
         if field.public is not None and field.stored:
             usual = _in_three_dimensions if field.rank else _unchanged
-            yield field.public, getattr(particles, field.name), special.get(field.name, usual)
+            rows: Any = special.get(field.name, usual)
+            yield field.public, getattr(particles, field.name), rows
     yield PRESSURE, checkpoint.pressure, _unchanged
 
 

@@ -1,12 +1,13 @@
-"""Instructions on copied blocks, in which the quantities follow one another, BLOCK numbers each."""
+"""Instructions on copied blocks: for each quantity BLOCK numbers, one after another."""
 
 from numba import types
 
+from sph.compiled import instruction
 from sph.neighbours.order import BLOCK
 from sph.simd.compaction import picked
 from sph.simd.memory import lanes_at, put_lanes
 from sph.simd.spatial import element, integer_plus
-from sph.simd.types import instruction, vector_type
+from sph.simd.types import vector_type
 
 
 @instruction

@@ -17,6 +17,7 @@ import numpy as np
 from numba import njit, types
 from numba.extending import overload
 
+from sph.arrays import empty
 from sph.compiled import INLINED, larger
 from sph.neighbours.lists import IMAGE_SHIFT
 from sph.neighbours.order import BLOCK
@@ -79,20 +80,20 @@ def _also(quantities, field, more):
 
 
 @njit(**INLINED)
-def scratch(lanes, dim, blocks, fields):
+def scratch(lanes, dim, blocks, quantities):
     """Return the scratch arrays for lists of up to `blocks` blocks: copied, near, boxes, chosen.
 
     copied: block by block, the quantities of the block one after another; near: a row for each
-    quantity; fields: a tuple with an entry for each quantity.
+    quantity; quantities: their number, and not a tuple, so that this is compiled once.
     """
     length = blocks * BLOCK + 2 * width(lanes)
     # rows an odd number of 128-byte lines apart: others would compete for the same lines of cache
     length = (length // 32 * 2 + 3) * 16
     return (
-        rows(lanes, 1, blocks * len(fields) * BLOCK)[0],
-        rows(lanes, len(fields), length),
+        rows(lanes, 1, blocks * quantities * BLOCK)[0],
+        rows(lanes, quantities, length),
         rows(lanes, 2 * len(dim) + 1, blocks + BLOCK),
-        np.empty(blocks + BLOCK, np.int32),
+        empty(blocks + BLOCK, np.int32),
     )
 
 

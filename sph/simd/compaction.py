@@ -11,6 +11,7 @@ from llvmlite import ir
 from numba import types
 from numba.core import cgutils, config
 
+from sph.compiled import instruction
 from sph.simd.types import (
     I32,
     I64,
@@ -20,7 +21,6 @@ from sph.simd.types import (
     Vec,
     call,
     in_every_lane,
-    instruction,
     integers,
     llvm_type,
 )

@@ -1,4 +1,4 @@
-"""The functions of NumPy that vectors have (`sph.simd`), with the intrinsics of LLVM for them.
+"""The functions of NumPy that vectors have (`sph.simd`), and their names in LLVM.
 
 Methods of models may use these functions, np.where, abs, + - * / **, comparisons, & | ^ ~ of these,
 and `larger` and `smaller` of `sph.compiled`.

@@ -3,6 +3,7 @@
 from llvmlite import ir
 from numba import types
 
+from sph.compiled import instruction
 from sph.simd.types import (
     FASTEST,
     I64,
@@ -11,7 +12,6 @@ from sph.simd.types import (
     Vec,
     call,
     in_every_lane,
-    instruction,
     integers,
     llvm_type,
     vector_type,

@@ -1,24 +1,20 @@
 """Reading and writing of lanes, and scratch arrays."""
 
-import numpy as np
 from llvmlite import ir
 from numba import types
 from numba.core import cgutils
-from numba.extending import overload
 
-from sph.compiled import INLINED
+from sph.arrays import allocate
+from sph.compiled import instruction
 from sph.simd.types import (
     I32,
     I64,
     Vec,
     in_every_lane,
-    instruction,
     integers,
     llvm_type,
     vector_type,
 )
-
-CACHE_LINE = 64  # bytes
 
 
 def address(context, builder, array_type, array, index_type, index):
@@ -31,6 +27,8 @@ def address(context, builder, array_type, array, index_type, index):
     parts = [
         context.cast(builder, one, kind, types.intp) for one, kind in zip(parts, kinds, strict=True)
     ]
+    if array_type.layout != "C":  # lanes would be read from other elements without any error
+        raise TypeError(f"{array_type}: expected an array in C order")
     view = context.make_array(array_type)(context, builder, array)
     return cgutils.get_item_pointer(context, builder, array_type, view, parts, wraparound=False)
 
@@ -161,27 +159,18 @@ def first_lanes(builder, number, width):
 
 
 @instruction
-def _location(typing_context, array):
+def rows(typing_context, lanes, number, length):
+    """Return an array (number, length) in the precision of `lanes`, aligned to cache lines.
+
+    Raises MemoryError.
+    """
+    kind = types.Array(lanes.instance_class.kind, 2, "C")
+
     def generate(context, builder, sig, arguments):
-        view = context.make_array(sig.args[0])(context, builder, arguments[0])
-        return builder.ptrtoint(view.data, I64)
+        shape = [
+            context.cast(builder, value, given, types.intp)
+            for value, given in zip(arguments[1:], sig.args[1:], strict=True)
+        ]
+        return allocate(context, builder, kind, shape)
 
-    return types.int64(array), generate
-
-
-def rows(lanes, number, length):
-    """Return an array (number, length) in the precision of `lanes`, aligned to cache lines."""
-
-
-@overload(rows, jit_options=INLINED)  # type: ignore[arg-type]
-def _rows(lanes, number, length):
-    kind = np.float32 if lanes.instance_class.kind == types.float32 else np.float64
-    size = np.dtype(kind).itemsize
-    line = CACHE_LINE // size
-
-    def make(lanes, number, length):
-        whole = np.empty(number * length + line, kind)
-        begin = (-_location(whole) % CACHE_LINE) // size
-        return whole[begin : begin + number * length].reshape(number, length)
-
-    return make
+    return kind(lanes, number, length), generate

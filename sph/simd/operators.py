@@ -7,9 +7,9 @@ from numba import types
 from numba.core.typing.templates import AbstractTemplate, infer_global, signature
 from numba.extending import lower_builtin
 
-from sph.compiled import larger, smaller
+from sph.compiled import instruction, larger, smaller
 from sph.simd.functions import BINARY, UNARY
-from sph.simd.types import FAST, FASTEST, Mask, Vec, as_vector, call, instruction, is_number
+from sph.simd.types import FAST, FASTEST, Mask, Vec, as_vector, call, is_number
 
 
 def _vector_of(kinds):

@@ -4,8 +4,9 @@ from llvmlite import ir
 from numba import types
 from numba.core import cgutils
 
+from sph.compiled import instruction
 from sph.simd.compaction import AVX512
-from sph.simd.types import EXACT, I32, I64, Vec, constant, instruction, llvm_type
+from sph.simd.types import EXACT, I32, I64, Vec, constant, llvm_type
 
 # First guesses by an integer operation on the exponent, with an error of 3.5 % at most (Lomont
 # 2003), and for AVX-512 by an instruction, with an error of 2^-14. With e = 1 - x y^n,

@@ -7,6 +7,7 @@ of dimensions is the length of `dim`, a constant for the compiler; no loop remai
 from numba import types
 from numba.core import cgutils
 
+from sph.compiled import instruction
 from sph.simd.compaction import picked
 from sph.simd.lanes import summed
 from sph.simd.memory import address, lanes_at, put_lanes
@@ -16,7 +17,6 @@ from sph.simd.types import (
     Vec,
     as_vector,
     call,
-    instruction,
     llvm_type,
     vector_type,
 )

@@ -1,12 +1,12 @@
 """The types of vectors and masks, and LLVM code that the other modules share."""
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from llvmlite import ir
 from numba import types
 from numba.core import cgutils
 from numba.core.typeconv import Conversion
-from numba.extending import intrinsic, lower_cast, models, register_model
+from numba.extending import lower_cast, models, register_model
 
 from sph.compiled import FASTMATH
 
@@ -15,11 +15,6 @@ FASTEST = ("fast",)  # for a minimum and maximum, see `sph.compiled`
 EXACT = ("contract",)  # for formulas whose order of operations matters
 
 I1, I32, I64 = ir.IntType(1), ir.IntType(32), ir.IntType(64)
-
-
-def instruction(emit) -> Any:
-    """Make a function that returns (signature, LLVM code) one that compiled code can call."""
-    return intrinsic(emit)
 
 
 class Double(NamedTuple):

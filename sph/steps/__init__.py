@@ -76,7 +76,7 @@ class Steps:
         if self._filled + most > MOST:
             self.pour()
             most = min(most, MOST)
-        now = np.array([s.time, s.limit.dt, s.energy_injected, s.held_supports, 0.0, 0.0, 0.0])
+        now = np.array([s.time, s.limit.dt, s.energy_injected, s.held_supports, 0.0, 0.0, 0.0, 0.0])
         begun, first, end = time.perf_counter(), 0, self._filled + most
         while True:
             step = s.step

@@ -12,6 +12,8 @@ from typing import Any
 import numpy as np
 from numba import njit
 
+from sph.arrays import empty
+from sph.compiled import LEAN
 from sph.integrators.step_size import next_step, rate_of_supports, restricted
 from sph.steps.calls import call, read_clock
 from sph.totals import drift_of
@@ -29,9 +31,9 @@ PAUSED, STALE, WIDER, DOUBTFUL = range(4)
 ) = range(19)  # fmt: skip
 
 # Entries of `now`, which changes from step to step: time, limit of the next step, energy injected,
-# number of supports limited by max_support, reach factor of the lists, and length and end of the
-# last step.
-NOW, LIMIT, GIVEN, LIMITED, REACH, LENGTH, UNTIL = range(7)
+# number of supports limited by max_support, reach factor of the lists, length and end of the last
+# step, and the limit of the next step as far as known.
+NOW, LIMIT, GIVEN, LIMITED, REACH, LENGTH, UNTIL, NEXT = range(8)
 
 # Entries of `fixed`, numbers that do not change within a call. BOX: volume of a box that gas fills,
 # 0 for others; STEP: number of steps before the call; LONGEST: seconds after which to return.
@@ -52,11 +54,11 @@ NOW, LIMIT, GIVEN, LIMITED, REACH, LENGTH, UNTIL = range(7)
 # then, and the phase that ends there, an index in `spent`, or -1.
 THUNK, BEGIN, ACTION, SWAPS, PHASE = range(5)
 
-# Kinds of words that change from step to step: the length of the step, the reach factor of the
-# lists, the limit of the next step, and the addresses of the two arrays that a pass may swap.
-DT, REACHED, NEXT_DT, FIRST, SECOND = range(5)
+# Kinds of words that change from step to step: entries of `now`, by their index, and the addresses
+# of the two arrays that a pass may swap.
+FIRST, SECOND = range(NEXT + 1, NEXT + 3)
 
-FLAGS: dict[str, Any] = {"error_model": "numpy", "no_cfunc_wrapper": True}
+FLAGS: dict[str, Any] = {"error_model": "numpy", **LEAN}
 OPTIONS: dict[str, Any] = {"cache": True, "nogil": True, **FLAGS}
 # of functions that only `take` calls: without wrappers for calls from Python
 HELPER: dict[str, Any] = {"no_cpython_wrapper": True, **FLAGS}
@@ -74,7 +76,7 @@ def take(calls, places, words, numbers, fixed, momentum, now, rows, spent, clock
     MemoryError.
     """
     base = words.ctypes.data
-    moment = np.empty(2, np.int64)
+    moment = empty(2, np.int64)
     begun = before = _nanoseconds(clock, moment)
     swapped = False
     steps = 0
@@ -86,9 +88,7 @@ def take(calls, places, words, numbers, fixed, momentum, now, rows, spent, clock
         if first == 0:
             dt, lands = next_step(now[NOW], now[LIMIT], fixed[STOP])
             now[LENGTH], now[UNTIL] = dt, (fixed[STOP] if lands else now[NOW] + dt)
-            _set(numbers, places, DT, dt)
-        else:
-            _set(numbers, places, REACHED, now[REACH])
+        _write(numbers, places, now)
         for k in range(first, calls.shape[0]):
             status: Any = call(calls[k, THUNK], base + 8 * calls[k, BEGIN])  # type: ignore
             if status != 0:
@@ -103,7 +103,7 @@ def take(calls, places, words, numbers, fixed, momentum, now, rows, spent, clock
                 now[REACH] = 1.0 + fixed[SKIN] - 2.0 * result
                 if not now[REACH] > numbers[at + 1]:
                     return STALE, steps, swapped
-                _set(numbers, places, REACHED, now[REACH])
+                _write(numbers, places, now)
             elif action == FINDS:
                 if result == 0.0:
                     return WIDER, steps, swapped
@@ -124,7 +124,8 @@ def take(calls, places, words, numbers, fixed, momentum, now, rows, spent, clock
                 limit, particle, criterion = restricted(
                     limit, particle, criterion, rate, words[at + 1], now[LIMIT], fixed[END]
                 )
-                _set(numbers, places, NEXT_DT, limit)
+                now[NEXT] = limit
+                _write(numbers, places, now)
             elif action == MEETS:
                 is_doubtful = is_doubtful or result > 0.0
             elif action == FENCES:
@@ -160,10 +161,11 @@ def _nanoseconds(clock, moment):
 
 
 @njit(**HELPER)
-def _set(numbers, places, kind, value):
+def _write(numbers, places, now):
+    """Write the entries of `now` to the words that hold them."""
     for index in range(places.shape[0]):
-        if places[index, 0] == kind:
-            numbers[places[index, 1]] = value
+        if places[index, 0] < FIRST:
+            numbers[places[index, 1]] = now[places[index, 0]]
 
 
 @njit(**HELPER)
@@ -171,17 +173,15 @@ def _exchange(words, places):
     """Exchange the addresses of the two arrays that a pass swaps."""
     first = second = 0
     for index in range(places.shape[0]):
-        kind, place = places[index]
-        if kind == FIRST:
-            first = words[place]
-        elif kind == SECOND:
-            second = words[place]
+        if places[index, 0] == FIRST:
+            first = words[places[index, 1]]
+        elif places[index, 0] == SECOND:
+            second = words[places[index, 1]]
     for index in range(places.shape[0]):
-        kind, place = places[index]
-        if kind == FIRST:
-            words[place] = second
-        elif kind == SECOND:
-            words[place] = first
+        if places[index, 0] == FIRST:
+            words[places[index, 1]] = second
+        elif places[index, 0] == SECOND:
+            words[places[index, 1]] = first
 
 
 @njit(**HELPER)

@@ -67,7 +67,8 @@ class Program:
         self.numbers = self.words.view(np.float64)
         self.calls = np.hstack([calls, np.array(self._ends, np.int64)])
         self._places = self._table.places
-        kinds = enumerate(("dt", "reach", "next_dt", *SWAPPED))
+        names = {driver.LENGTH: "dt", driver.REACH: "reach", driver.NEXT: "next_dt"}
+        kinds = (*names.items(), *zip((driver.FIRST, driver.SECOND), SWAPPED, strict=True))
         found = [(kind, one) for kind, name in kinds for one in self._places.get(name, [])]
         self.places = np.array(found, np.int64)
 

@@ -9,10 +9,13 @@ import re
 import shlex
 from pathlib import Path
 
+import numpy as np
 import pytest
+from numba import njit
 
-from sph import registry
+from sph import declarations, kernels, registry, simd
 from sph.cli import main
+from sph.compiled import FLAGS
 from sph.config.choices import ModelChoice
 from sph.config.sections import SECTIONS
 
@@ -149,3 +152,20 @@ def test_example_defines_names_common_to_its_folder(folder, name, code):
     methods = {one for one in common if inspect.isfunction(siblings[0][one]) and one[0] != "_"}
     assert methods
     assert methods <= set(vars(example))
+    if folder != "sph/problems":
+        example_model = example(*(0.5 for _ in example._fields))
+        declarations.check_on_vectors([example_model])
+
+
+def test_example_of_a_pair_loop_runs_on_vectors():
+    text = text_of(ROOT / "docs" / "design.md").partition("## Vectors")[2].partition("\n## ")[0]
+    code = re.search(r"```python\n(.*?)```", text, re.DOTALL).group(1)
+    space = {**vars(simd), "njit": njit, "COMPILED": FLAGS, "w": kernels.w}  # no file to cache for
+    exec(compile(code, "docs/design.md", "exec"), space)
+    kernel, dim = kernels.make("cubic_spline"), (0, 0, 0)
+    mass, r = np.random.default_rng(1).random((2, 32))
+    expected = np.sum(mass * kernel.w(dim, r / 0.8))
+    for lanes, kind in ((simd.DOUBLE, float), (simd.SINGLE, np.float32), (simd.SCALAR, float)):
+        found = space["sum_of_kernels"](lanes, kernel, dim, mass.astype(kind), r.astype(kind), 0.8)
+        # 32 terms of order one, of some roundings each
+        assert found == pytest.approx(expected, rel=32 * float(np.finfo(kind).eps))

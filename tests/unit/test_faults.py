@@ -32,7 +32,7 @@ def state(n=4, dimension=2, boundary="open", parts=(), **changed):
         particles=SimpleNamespace(**arrays | changed),
         scene=SimpleNamespace(
             all_parts=parts, domain=Domain(box, (boundary,) * dimension),
-            physics=SimpleNamespace(C=0.1),
+            physics=SimpleNamespace(C=0.1), is_single=False,
             step_bounds=Bounds(0.1, "signal_speed", True, False, 1.0),
         ),
     )  # fmt: skip

@@ -319,25 +319,20 @@ def test_widening_extends_requesting_blocks_and_keeps_others(boundaries, asking,
 
 
 def test_widening_renews_only_lists_that_ask_or_are_reached(full_builds, monkeypatch):
-    renewals, again = [], lists.Builder.again
-
-    def watched(self, old, wanted):
-        renewals.append(np.flatnonzero(wanted))
-        return again(self, old, wanted)
-
-    monkeypatch.setattr(lists.Builder, "again", watched)
+    again, wanted_again = lists.Builder.again, []
+    monkeypatch.setattr(
+        lists.Builder, "again", lambda *a: wanted_again.append(a[2].copy()) or again(*a)
+    )
     position, support = positions("random", 2, 4000), np.full(4000, 0.02)
     search, _ = search_over(("periodic", "mirror"), position, support, 0.1)
-    before, old = search.lists, entries(search)
+    first, old = search.lists.first, entries(search)
     wanted = np.zeros(order.number_of_blocks(4000))
     wanted[[100, 300]] = 2.0
     search.widen(wanted, np.arange(4000))
-    own = np.searchsorted(before.first, [100, 300], side="right") - 1
+    own = np.searchsorted(first, [100, 300], side="right") - 1
     new = entries(search)
-    reached = {
-        int(one) for k in own for one in np.searchsorted(before.first, new[k][0], side="right") - 1
-    }
-    renewed = set(np.concatenate(renewals))
+    reached = {k for one in own for k in np.searchsorted(first, new[one][0], side="right") - 1}
+    renewed = set(np.flatnonzero(np.any(wanted_again, axis=0)))
     assert renewed == reached | set(own)
     assert len(renewed) < 0.4 * len(new)
     assert len(full_builds) == 1
@@ -388,7 +383,7 @@ def _selected(first, last, dim, neighbours, position, support, support_inverse, 
     """
     D, lanes, lists, n = len(dim), neighbours.lanes, neighbours.lists, support.size
     fields = dim + (0, 0)  # noqa: RUF005  # position, number, 1/H
-    copied, near, boxes, chosen = scratch(lanes, dim, longest_list(first, last, lists), fields)
+    copied, near, boxes, chosen = scratch(lanes, dim, longest_list(first, last, lists), len(fields))
     for superblock in range(first, last):
         begin, end = lists.first[superblock], lists.first[superblock + 1]
         x_0 = at(dim, position, begin * BLOCK)
@@ -491,7 +486,7 @@ def test_selection_is_independent_of_when_lists_were_built(boundaries, own):
 def _chosen(first, last, dim, neighbours, position, per_length, reach):
     """Return how many blocks of each list are within `reach` of the first of its superblock."""
     lanes, lists = neighbours.lanes, neighbours.lists
-    _, _, boxes, chosen = scratch(lanes, dim, longest_list(first, last, lists), dim)
+    _, _, boxes, chosen = scratch(lanes, dim, longest_list(first, last, lists), len(dim))
     number = np.empty(last - first, np.int64)
     for one in range(first, last):
         own = lists.first[one]

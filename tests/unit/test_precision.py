@@ -8,8 +8,9 @@ from click.testing import CliRunner
 from marks import slow_except
 
 from sph import config as configuration
-from sph import threads
+from sph import resolution, threads
 from sph.cli import main
+from sph.errors import NumericalError
 from sph.output import checkpoint as checkpoints
 from sph.output.checkpoint import state_hash
 from sph.output.run_directory import RunDirectory
@@ -166,3 +167,69 @@ def test_units_and_precision_change_only_last_digits(simulate, name):
             # positions are rounded to 2^-24 of the superblock, 60 spacings in 1-D, and the forces
             # of two sides of a particle cancel; 1.3e-5 was the most that was seen, otherwise 1.5e-6
             assert difference < (3e-5 if key == "acceleration" else 4e-6), key
+
+
+# --- contrasts ---
+
+
+def cluster(simulate, size, precision="single"):
+    """A cloud of 200 particles with a dense cluster of 200, in one superblock."""
+    random = np.random.default_rng(3)
+    x = np.concatenate([random.random((200, 3)), 0.5 + size * random.random((200, 3))])
+    config = configuration.from_text(
+        f'[problem]\nname = "particles"\ndimension = 3\ndomain = [0.0, 1.0]\n'
+        f"positions = {x.tolist()}\n[physics]\nC = 0.05\n"
+    )
+    return simulate(config.override([f"run.precision={precision}"]))
+
+
+def test_cluster_in_cloud_is_refused_where_single_precision_does_not_resolve_it(simulate):
+    expected = cluster(simulate, 1e-2, "double").particles.by_id()
+    found = cluster(simulate, 1e-2)
+    # ratio of 2e-5 in sph.resolution; five times as much is the most that was seen
+    np.testing.assert_allclose(found.particles.by_id().density, expected.density, rtol=1e-4)
+    assert resolution.doubt(found) is None
+    # at 1e-4 the density of a particle is wrong by 4e-4
+    with pytest.raises(NumericalError, match="float32 does not resolve the position"):
+        cluster(simulate, 1e-4)
+    assert cluster(simulate, 1e-4, "double").particles.density.max() > 0.0
+
+
+def test_cluster_near_limit_warns(simulate, monkeypatch):
+    monkeypatch.setattr(resolution, "REFUSED", np.inf)
+    assert 'Try: run.precision = "double".' in resolution.doubt(cluster(simulate, 1e-4))
+    assert resolution.doubt(cluster(simulate, 1e-4, "double")) is None
+
+
+def test_contrast_beyond_float32_stops_and_names_double_precision(simulate):
+    """A cold gas at rest beside a wind of Mach 1e22: the square of its speed is not a float32."""
+    x = (np.arange(40) + 0.5) / 40
+    config = configuration.from_text(
+        f'[problem]\nname = "particles"\ndimension = 1\ndomain = [0.0, 1.0]\n'
+        f'boundary = "mirror"\npositions = {x[:, None].tolist()}\n'
+        f"velocities = {np.where(x < 0.5, 1.0, 0.0)[:, None].tolist()}\n"
+        f"internal_energies = 1e-44\n"
+    )
+    with pytest.raises(NumericalError, match=r'run\.precision = "double"'):
+        simulate(config.override(["run.precision=single"]))
+    simulate(config)
+
+
+def test_density_step_of_1e12_advances(simulate):
+    """The density of thin gas in units of dense gas beside it has a square below any float32."""
+    x = (np.arange(100) + 0.5) / 100
+    thin = np.where(x < 0.5, 1.0, 1e-12)
+    config = configuration.from_text(
+        f'[problem]\nname = "particles"\ndimension = 1\ndomain = [0.0, 1.0]\n'
+        f'boundary = "mirror"\npositions = {x[:, None].tolist()}\n'
+        f"masses = {(thin / 100).tolist()}\ninternal_energies = {(1 / thin).tolist()}\n"
+        f'[physics]\ndensity = "number"\n'
+    )
+    double, single = (
+        simulate(config.override([f"run.precision={one}"])) for one in ("double", "single")
+    )
+    for run in (double, single):
+        run.advance(1.0)
+    for field in ("density", "internal_energy"):
+        found, expected = (getattr(run.particles.by_id(), field) for run in (single, double))
+        np.testing.assert_allclose(found, expected, rtol=1e-5)  # 1e-6 was seen

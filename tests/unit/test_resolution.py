@@ -155,7 +155,8 @@ def simulation_with_gap(monkeypatch):
             id=np.array([5, 6, 9]), position=np.array([[1.0, 2.0, 3.0], [4.0, 5.0, 6.0]]),
             velocity=-np.array([[1.0, 2.0, 3.0], [4.0, 5.0, 6.0]]),
         )  # fmt: skip
-        return SimpleNamespace(particles=particles, step=0, time=0.0)
+        scene = SimpleNamespace(is_single=False)
+        return SimpleNamespace(particles=particles, scene=scene, step=0, time=0.0)
 
     return made
 

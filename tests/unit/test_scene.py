@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from sph import config as configuration
-from sph.formulations.gas.smoothing import Converged, FixedPasses
+from sph.formulations.gas.smoothing import Smoothing
 from sph.formulations.gas.weighting import ByMass, ByNumber
 from sph.parts.conductivity.pressure_jump import PressureJump
 from sph.scene import Scene
@@ -118,20 +118,20 @@ def test_scene_all_axes_open_limits_supports(boundary, expected):
 
 def test_scene_models_match_configuration():
     plain = scene().formulation.models
-    assert plain.smoothing == FixedPasses(2, 1e-10)
+    assert plain.smoothing == Smoothing(2, 1e-10)
     assert isinstance(plain.weighting, ByMass)  # both are equal to ()
     assert plain.balsara is not None
     assert plain.exchange is None
     other = scene("physics.density=number", "physics.density_passes=3", STILL).formulation.models
-    assert other.smoothing == FixedPasses(3, 1e-10)
+    assert other.smoothing == Smoothing(3, 1e-10)
     assert isinstance(other.weighting, ByNumber)
     assert other.balsara is None
     conducting = scene(CONTACTS).formulation.models.exchange
     assert conducting == PressureJump(1.0, True)
     assert type(conducting) is PressureJump
     for made in (scene(), scene("physics.density_passes='converged'")):
-        assert made.formulation.starting_models.smoothing == Converged(1e-10)
-    assert made.formulation.models is made.formulation.starting_models
+        assert made.formulation.starting_models.smoothing == Smoothing(0, 1e-10)
+    assert made.formulation.models == made.formulation.starting_models
     begun = scene().formulation.starting_models
     assert plain._replace(smoothing=None) == begun._replace(smoothing=None)
 
@@ -169,8 +169,9 @@ def test_scene_part_included_or_left_out_with_reason(part):
 
 def test_scene_names_parts_always_included():
     inside, outside = scene("problem.boundary=periodic", "physics.density=number").described()
-    assert inside[:6] == [
+    assert inside[:7] == [
         "2-D, 9 image(s) of the box",
+        "sums over neighbours in double precision",
         "scheme grad_h, kernel wendland_c2",
         "density by number",
         "equation of state ideal_gas",

@@ -402,7 +402,7 @@ def test_step_after_stiff_one_growth_is_limited(begin, monkeypatch):
 
     assert largest_growth() <= 1.5 * (1 + 1e-15)  # one product of rounding
     monkeypatch.setattr(step_size, "GROWTH", math.inf)
-    assert largest_growth() > 10
+    assert largest_growth() > 3  # 7 and 11 seen: particles that cross are chaotic
 
 
 def test_check_of_valid_state_reads_no_particles(begin):

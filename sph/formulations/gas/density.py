@@ -6,6 +6,7 @@ Sums over candidates are in the units of the superblock (`sph.passes.gather`).
 import numpy as np
 from numba import njit
 
+from sph.arrays import empty
 from sph.compiled import COMPILED, INLINED
 from sph.formulations.gas.smoothing import ROWS, WEIGHT, R, find_support
 from sph.formulations.gas.thermodynamics import summed, thermodynamics
@@ -81,14 +82,14 @@ def density(
     weighting, lists = models.weighting, neighbours.lists
     # position, weight, velocity, m u; Numba does not know (*dim, 0)
     fields = also(also(dim + (0,), div_v, dim), energy_shift, (0,))  # noqa: RUF005
-    copied, near, boxes, chosen = scratch(lanes, dim, longest_list(first, last, lists), fields)
+    copied, near, boxes, chosen = scratch(lanes, dim, longest_list(first, last, lists), len(fields))
     # the particles of a block are treated together unless their candidates fill the nearest cache
     group = BLOCK if D < 3 else 1
     pairs = rows(lanes, group * ROWS, near.shape[1])
-    members, n = np.empty(BLOCK, np.int64), np.empty(BLOCK, np.int64)
+    members, n = empty(BLOCK, np.int64), empty(BLOCK, np.int64)
     for superblock in range(first, last):
         begin, end = lists.first[superblock], lists.first[superblock + 1]
-        if not wanted[begin:end].any():
+        if not _any(wanted, begin, end):
             continue
         i_0, i_end = begin * BLOCK, min(end * BLOCK, mass.size)
         x_0, v_0 = middle(dim, neighbours, begin, end), at(dim, velocity, i_0)
@@ -189,6 +190,15 @@ def density(
                 lanes, models, block, energy, support, rho, Omega, div_v, curl_v, alpha,
                 energy_shift, pressure, pressure_term, sound_speed, balsara, alpha_rate,
             )  # fmt: skip
+
+
+@njit(**INLINED)
+def _any(wanted, first, last):
+    """Return whether one of the blocks [first, last) is wanted."""
+    found = False
+    for block in range(first, last):
+        found = found or wanted[block] != 0.0
+    return found
 
 
 @njit(**INLINED)

@@ -4,6 +4,7 @@ import numpy as np
 from numba import njit, types
 from numba.extending import overload
 
+from sph.arrays import empty
 from sph.compiled import COMPILED, INLINED, larger, smaller
 from sph.formulations.gas.schemes import pair
 from sph.formulations.gas.terms import exchange_speed, pair_alpha
@@ -81,8 +82,8 @@ def rates(
     every = also(with_share, energy_shift, (0,))
     a_row, f_row, u_row = len(fields), len(with_alpha), len(with_f)
     share_row, shift_row = len(with_u), len(with_share)
-    copied, near, boxes, chosen = scratch(lanes, dim, longest_list(first, last, lists), every)
-    used = np.empty(near.shape[1] // width(lanes), np.int64)
+    copied, near, boxes, chosen = scratch(lanes, dim, longest_list(first, last, lists), len(every))
+    used = empty(near.shape[1] // width(lanes), np.int64)
     for superblock in range(first, last):
         begin, end = lists.first[superblock], lists.first[superblock + 1]
         i_0, i_end = begin * BLOCK, min(end * BLOCK, mass.size)

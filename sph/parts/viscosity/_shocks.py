@@ -11,6 +11,7 @@ shrink with the step.)
 import numpy as np
 from numba import njit
 
+from sph.arrays import empty
 from sph.compiled import COMPILED, INLINED, larger, smaller, verb
 from sph.formulations.gas.weighting import copy_weights, mass_per_weight, weight
 from sph.kernels import dw_over_q, normalisation, w
@@ -114,12 +115,12 @@ def shocks(
     # rows of candidates: position, velocity, acceleration, weight, its sign, c/2
     m_row, signed_row, c_row = 3 * D, 3 * D + 1, 3 * D + 2
     fields = dim + dim + dim + (0, 0, 0)
-    copied, near, boxes, chosen = scratch(lanes, dim, longest_list(first, last, lists), fields)
+    copied, near, boxes, chosen = scratch(lanes, dim, longest_list(first, last, lists), len(fields))
     # rows of neighbours: r_ij/H, g r_ij/H, v_ij, a_ij
     pairs = rows(lanes, 4 * D, near.shape[1])
-    matrix = np.empty((D, D))
-    inverse = np.empty((D, D))
-    L = np.empty((D, D))
+    matrix = empty((D, D), np.float64)
+    inverse = empty((D, D), np.float64)
+    L = empty((D, D), np.float64)
     for superblock in range(first, last):
         begin, end = lists.first[superblock], lists.first[superblock + 1]
         i_0, i_end = begin * BLOCK, min(end * BLOCK, mass.size)

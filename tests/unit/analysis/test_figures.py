@@ -76,7 +76,8 @@ def write_run(path, states) -> RunDirectory:
     steps = History.create(run.history, made.problem.dimension, list(diagnostics[0]))
     for step, state in enumerate(states):
         row = dict.fromkeys(steps.columns, 1.0 + step) | diagnostics[step]
-        steps.append(row | {"step": step, "t": state.time, "limiter": "signal_speed"})
+        row |= {"step": step, "t": state.time, "limiter": "signal_speed"}
+        steps.extend({name: [value] for name, value in row.items()})
         checkpoint.write(run.checkpoint_path(step), state.checkpoint)
     steps.close()
     return run

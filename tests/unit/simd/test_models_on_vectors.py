@@ -51,7 +51,8 @@ def verbs_of(model, lanes):
 
 def test_models_have_every_verb():
     found = {name for model in MODELS for name in verbs_of(model, simd.SCALAR)}
-    assert found == set(VERBS)
+    # tests in this process may have verbs of their own
+    assert found == {name for name, one in VERBS.items() if one.__module__.startswith("sph.")}
 
 
 def label(model):

@@ -11,7 +11,7 @@ from lanes import LANES, compiled, every_lanes, precision
 
 from sph import compiled as of_sph
 from sph import simd
-from sph.simd.memory import CACHE_LINE
+from sph.arrays import CACHE_LINE
 
 N = 32  # a multiple of all widths
 EXPRESSIONS = [
@@ -94,6 +94,15 @@ def test_operations_of_different_widths_are_refused():
 
 
 # --- memory ---
+
+
+@pytest.mark.parametrize("call", ["load(DOUBLE, a, (0, 0))", "at((0, 0), a, 0)"])
+def test_arrays_in_another_order_are_refused(call):
+    run = compiled(f"def run(a):\n    {call}")
+    run(np.zeros((2, 8)))
+    for a in (np.zeros((2, 8), order="F"), np.zeros((2, 16))[:, ::2]):
+        with pytest.raises(Exception, match="expected an array in C order"):
+            run(a)
 
 
 @every_lanes
@@ -284,6 +293,10 @@ AVX2 = {"NUMBA_CPU_NAME": "haswell", "NUMBA_CPU_FEATURES": "+avx2,+fma,+bmi,+bmi
 PROCESSORS = {"avx2": AVX2, "generic": {"NUMBA_CPU_NAME": "generic"}}
 
 
+# what the instructions of a processor decide; of the engine one case, since each is compiled anew
+CHOSEN = "partial or come_to_the_front or inverse or columns or (2d-mirror-mirror and fresh)"
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("name", PROCESSORS)
 def test_other_instructions_pass_the_same_tests(name):
@@ -292,7 +305,7 @@ def test_other_instructions_pass_the_same_tests(name):
         pytest.skip("this processor has no AVX2")
     here = os.path.dirname(__file__)
     found = subprocess.run(
-        [sys.executable, "-m", "pytest", "-q", "-n0", "-m", "not slow", "-k", "not threads",
+        [sys.executable, "-m", "pytest", "-q", "-n0", "-m", "not slow", "-k", CHOSEN,
          f"{here}/test_simd.py", f"{here}/test_spatial.py", f"{here}/../test_engine.py"],
         env=os.environ | PROCESSORS[name], capture_output=True, text=True, timeout=600, check=False,
     )  # fmt: skip
@@ -302,3 +315,27 @@ def test_other_instructions_pass_the_same_tests(name):
         env=os.environ | PROCESSORS[name], capture_output=True, text=True, check=True,
     )  # fmt: skip
     assert chosen.stdout.strip() == ("avx2" if name == "avx2" else "")
+
+
+TUBE = '[problem]\nname = "shock_tube"\nn = 60\n[time]\nend = 0.02\n[output]\ninterval = 0.01\n'
+
+
+@pytest.mark.slow
+def test_restart_with_other_instructions_names_them(tmp_path):
+    """Bits differ between processors; a restart says so."""
+    (tmp_path / "tube.toml").write_text(TUBE)
+    run, other = tmp_path / "run", tmp_path / "other"
+
+    def sph_(environment, *arguments):
+        found = subprocess.run(
+            [sys.executable, "-m", "sph", *map(str, arguments)],
+            env=os.environ | environment, capture_output=True, text=True, timeout=300, check=True,
+        )  # fmt: skip
+        return found.stderr
+
+    sph_({}, "run", tmp_path / "tube.toml", "-o", run)
+    source = run / "checkpoints" / "checkpoint_000001.h5"
+    assert "digits" not in sph_({}, "restart", source, "-o", tmp_path / "same")
+    said = sph_(PROCESSORS["generic"], "restart", source, "-o", other)
+    assert "may differ in their last digits" in said
+    assert "NUMBA_CPU_NAME (None, here generic)" in said

@@ -73,7 +73,7 @@ def density(
     D, lanes, lists = len(dim), neighbours.lanes, neighbours.lists
     C = normalisation(models.kernel, dim)
     fields = dim + (0,)  # noqa: RUF005  # position, mass
-    copied, near, boxes, chosen = scratch(lanes, dim, longest_list(first, last, lists), fields)
+    copied, near, boxes, chosen = scratch(lanes, dim, longest_list(first, last, lists), len(fields))
     for superblock in range(first, last):
         begin, end = lists.first[superblock], lists.first[superblock + 1]
         i_0, i_end = begin * BLOCK, min(end * BLOCK, mass.size)
@@ -122,7 +122,7 @@ def rates(
     C, kernel = normalisation(models.kernel, dim), models.kernel
     rest = 2 * D
     fields = dim + dim + (0, 0, 0, 0, 0)
-    copied, near, boxes, chosen = scratch(lanes, dim, longest_list(first, last, lists), fields)
+    copied, near, boxes, chosen = scratch(lanes, dim, longest_list(first, last, lists), len(fields))
     for superblock in range(first, last):
         begin, end = lists.first[superblock], lists.first[superblock + 1]
         i_0, i_end = begin * BLOCK, min(end * BLOCK, mass.size)
