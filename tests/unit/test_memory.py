@@ -129,8 +129,10 @@ def transient(function):
 # Bounds of the following tests: what was measured, and 8 to 10 % to spare for objects of Python.
 
 
-def test_check_of_resolution_needs_few_arrays(gas):
-    assert transient(lambda: resolution.check(gas)) < 62.0
+@pytest.mark.parametrize("precision", ["double", "single"])
+def test_check_of_resolution_needs_few_arrays(gas, monkeypatch, precision):
+    monkeypatch.setattr(Scene, "is_single", precision == "single")
+    assert transient(lambda: resolution.check(gas)) < 50.0
 
 
 def test_errors_of_vectors_are_computed_axis_by_axis(gas):
