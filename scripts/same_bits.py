@@ -234,6 +234,7 @@ def followed(text: str, overrides: list[str], stop_at: int | None) -> dict:
             config = config.override(["run.threads=1", *fixed, *overrides])
             follow = Follow(config.time.end, stop_at)
             directory = RunDirectory.create(Path(home) / "run")
+            runner.MOST = 1  # `follow` looks at every step
             try:
                 runner.run(config, directory, follow)
             except Stopped:

@@ -136,7 +136,7 @@ def bytes_held(simulation) -> int:
     search = simulation.search
     held = [
         *vars(simulation.particles).values(), *vars(simulation).values(), *search.lists,
-        *search.origin,
+        *search.origin, search.boxes,
     ]  # fmt: skip
     return sum(array.nbytes for array in held if isinstance(array, np.ndarray))
 

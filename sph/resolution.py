@@ -22,7 +22,6 @@ sizes 1e-2, 1e-4 and 1e-6 of the cloud): ratios 2e-5, 2e-3 and 0.2 gave density 
 and 5e-2.
 """
 
-import functools
 from typing import NamedTuple
 
 import numpy as np
@@ -57,10 +56,10 @@ def largest_gap(particles, spacing, sound_speed) -> Gap:
     resolved, but cold streams that collide at that speed are.
     """
     spacing = np.broadcast_to(spacing, particles.mass.shape)
-    gaps = [
-        _largest("position", particles.position, spacing),
-        _largest("velocity", particles.velocity, _departure(particles.velocity) + sound_speed),
-    ]
+    gaps = [_largest("position", particles.position, spacing)]
+    speed = _departure(particles.velocity)
+    speed += sound_speed
+    gaps.append(_largest("velocity", particles.velocity, speed))
     return max(gaps, key=lambda gap: gap.size / gap.scale if gap.scale > 0.0 else 0.0)
 
 
@@ -69,12 +68,20 @@ def largest_gap(particles, spacing, sound_speed) -> Gap:
 
 def _departure(velocity: np.ndarray) -> np.ndarray:
     """Return |v - median of v|, (N,), of velocities (D, N)."""
-    return np.sqrt(sum((v - np.median(v)) ** 2 for v in velocity))
+    squared = np.zeros(velocity.shape[1])
+    for v in velocity:
+        away = v - np.median(v)
+        away *= away
+        squared += away
+    return np.sqrt(squared, out=squared)
 
 
 def _largest(kind: str, values: np.ndarray, scale: np.ndarray) -> Gap:
     """Return the largest gap of values (D, N) over scale (N,)."""
-    size = np.spacing(functools.reduce(np.maximum, map(np.abs, values)))
+    size = np.zeros(values.shape[1])
+    for row in values:
+        np.maximum(size, np.abs(row), out=size)
+    np.spacing(size, out=size)
     # pressureless gas at rest has scale 0 and needs no check; the watchdog reports NaN
     ratio = np.divide(size, scale, out=np.zeros_like(size), where=scale > 0.0)
     i = int(np.argmax(np.nan_to_num(ratio, copy=False, nan=0.0)))
@@ -127,11 +134,15 @@ def _spacing(simulation) -> np.ndarray:
 
 def _gap_in_single(simulation) -> Gap:
     """Return the gap of positions from the middle of superblocks that has the largest ratio."""
-    x, spacing = simulation.particles.position, _spacing(simulation)
+    position, spacing = simulation.particles.position, _spacing(simulation)
     begin = simulation.search.lists.first[:-1] * BLOCK
-    low, high = (function.reduceat(x, begin, axis=1) for function in (np.minimum, np.maximum))
-    middle = np.repeat(0.5 * (low + high), np.diff(begin, append=x.shape[1]), axis=1)
-    size = np.spacing(np.abs((x - middle) / spacing).astype(np.float32)).max(axis=0)
+    number = np.diff(begin, append=spacing.size)
+    size = np.zeros(spacing.size, np.float32)
+    for x in position:  # axis by axis, as above
+        middle = 0.5 * (np.minimum.reduceat(x, begin) + np.maximum.reduceat(x, begin))
+        away = x - np.repeat(middle, number)
+        away /= spacing
+        np.maximum(size, np.spacing(np.abs(away).astype(np.float32)), out=size)
     i = int(np.argmax(size))
     return Gap("place", i, float(size[i] * spacing[i]), float(spacing[i]))
 

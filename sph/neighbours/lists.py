@@ -162,6 +162,18 @@ def _copy_lists(old_start, count, old_entries, start, entries):
 
 
 @njit(**COMPILED)
+def _regions(room, begin, is_estimate):
+    """Return where the region of each chunk begins and, last, where the storage ends."""
+    region = np.empty(room.size + 1, np.int64)
+    region[0] = begin
+    for chunk in range(room.size):
+        # 15 % to spare: lists rebuilt in a developing flow rarely have to be built twice
+        spare = room[chunk] // 7 + 8 if is_estimate else 0
+        region[chunk + 1] = region[chunk] + room[chunk] + spare
+    return region
+
+
+@njit(**COMPILED)
 def leaves(tree: Tree) -> np.ndarray:
     """Return the node of each block, (blocks,)."""
     found = empty(tree.last[0], np.int64)
@@ -198,14 +210,18 @@ class Builder:
         lists are built again.
         """
         number = self.first.size - 1
-        start, count = np.zeros(number, np.int64), np.zeros(number, np.int64)
+        start, count = np.empty(number, np.int64), np.empty(number, np.int64)
         kind = np.int32 if self.images.sign.shape[0] <= SHORT_IMAGES else np.int64
         empty = Lists(self.first, start, count, np.empty(0, kind))
         return self._filled(empty, np.ones(number, np.bool_), room)
 
     def again(self, old: Lists, wanted: np.ndarray) -> Lists:
         """Return lists of which those of `wanted` (superblocks,) are new."""
-        return self._filled(old, wanted, None)[0]
+        kept = np.where(wanted, 0, old.count)
+        start = np.cumsum(kept) - kept
+        entries = np.empty(kept.sum(), old.entries.dtype)
+        _copy_lists(old.start, kept, old.entries, start, entries)
+        return self._filled(old._replace(start=start, entries=entries), wanted, None)[0]
 
     def boxes(self) -> np.ndarray:
         """Return the lower and upper corners of the box of each block, (blocks, 2 D)."""
@@ -216,25 +232,23 @@ class Builder:
         return boxes
 
     def _filled(self, old, wanted, room):
+        """Return `old` with the lists of `wanted` added, in storage after that of `old`."""
         chunks = (wanted.size + CHUNK - 1) // CHUNK
-        if room is None or room.size != chunks:
+        is_estimate = room is not None and room.size == chunks
+        if not is_estimate:
             room = np.zeros(chunks, np.int64)  # the lists are counted before they are written
-        else:  # 15 % to spare: lists rebuilt in a developing flow rarely have to be built twice
-            room = room + room // 7 + 8
         needed = np.empty(chunks, np.int64)
-        kept = np.where(wanted, 0, old.count)
-        start, begin = np.cumsum(kept) - kept, int(kept.sum())
+        begin = old.entries.size
         dim = (0,) * self.images.sign.shape[1]
         while True:
-            region = begin + np.append(0, np.cumsum(room))
+            region = _regions(room, begin, is_estimate)
             entries = np.empty(region[-1], old.entries.dtype)
-            if begin > 0:
-                _copy_lists(old.start, kept, old.entries, start, entries)
+            entries[:begin] = old.entries
             self.team.run(
                 _fill_chunks, chunks, dim, self.tree, self.leaves, self.stretch, self.images,
-                wanted, self.first, region, start, old.count, entries, needed,
+                wanted, self.first, region, old.start, old.count, entries, needed,
                 smallest=max(1, SMALLEST_RANGE // (SUPERBLOCK * CHUNK)),
             )  # fmt: skip
             if (needed <= np.diff(region)).all():
-                return old._replace(start=start, entries=entries), needed
-            room = needed.copy()
+                return old._replace(entries=entries), needed
+            room, is_estimate = needed.copy(), False

@@ -41,24 +41,28 @@ def write_dataset(group: h5g.GroupID, name: str, array: np.ndarray) -> h5d.Datas
 
 
 def write_checked(
-    group: h5g.GroupID, name: str, part: Callable[[int, int], np.ndarray], number: int, largest: int
+    group: h5g.GroupID, name: str, part: Callable[[int, int], np.ndarray], number: int, longest: int
 ) -> h5d.DatasetID:
     """A new dataset of `number` rows that is checked when it is read (Fletcher-32).
 
-    part(first, last) returns rows [first, last). A chunk has up to `largest` bytes. Chunks are
-    asked for and written one after another, so that all rows never exist at once.
+    part(first, last) returns rows [first, last). A chunk has up to `longest` rows. Chunks are asked
+    for and written one after another, so that all rows never exist at once.
     """
-    row = part(0, 1)
-    chunk = (min(number, largest // row.nbytes), *row.shape[1:])
-    stored, in_memory = _types(row.dtype)
-    space = h5s.create_simple((number, *row.shape[1:]))
-    plan = _plan_of_dataset(chunk)
-    dataset = h5d.create(group, name.encode(), stored, space, dcpl=plan, dapl=_uncached())
-    for first in range(0, number, chunk[0]):
-        data = np.asarray(part(first, min(first + chunk[0], number)), order="C")
-        space.select_hyperslab((first, *(0 for _ in row.shape[1:])), data.shape)
+    chunk = min(number, longest)
+    data = np.asarray(part(0, chunk), order="C")
+    shape, (stored, in_memory) = (number, *data.shape[1:]), _types(data.dtype)
+    plan = _plan_of_dataset(data.shape)
+    dataset = h5d.create(group, name.encode(), stored, _space(shape), dcpl=plan, dapl=_uncached())
+    if chunk == number:
+        dataset.write(h5s.ALL, h5s.ALL, data, mtype=in_memory)
+        return dataset
+    space = h5s.create_simple(shape)
+    for first in range(0, number, chunk):
+        if first > 0:
+            del data  # before the next part exists
+            data = np.asarray(part(first, min(first + chunk, number)), order="C")
+        space.select_hyperslab((first, *(0 for _ in shape[1:])), data.shape)
         dataset.write(_space(data.shape), space, data, mtype=in_memory)
-        del data  # before the next part exists
     return dataset
 
 

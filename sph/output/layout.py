@@ -99,7 +99,8 @@ def write_rows(
     def part(first: int, last: int) -> np.ndarray:
         return in_rows(array[..., first:last])
 
-    return hdf5.write_checked(group, name, part, array.shape[-1], LARGEST_CHUNK)
+    longest = LARGEST_CHUNK // (8 * 3 ** (array.ndim - 1))
+    return hdf5.write_checked(group, name, part, array.shape[-1], longest)
 
 
 def _fields(checkpoint, frame: Frame) -> Iterator[tuple[Public, np.ndarray, Rows]]:
@@ -109,7 +110,7 @@ def _fields(checkpoint, frame: Frame) -> Iterator[tuple[Public, np.ndarray, Rows
     """
     config, particles = checkpoint.config, checkpoint.particles
     ratio = kernels.support_ratio(config.physics.kernel_model(), particles.dimension)
-    special = {
+    special: dict[str, Rows] = {
         "position": partial(in_frame, frame, config.problem.boundaries),
         "support": lambda support: support / ratio,
     }

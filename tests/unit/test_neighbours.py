@@ -336,6 +336,7 @@ def test_widening_renews_only_lists_that_ask_or_are_reached(full_builds, monkeyp
     assert renewed == reached | set(own)
     assert len(renewed) < 0.4 * len(new)
     assert len(full_builds) == 1
+    assert search.lists.entries.size == search.lists.count.sum()  # no gaps where old lists were
     for k in set(range(len(new))) - renewed:
         np.testing.assert_array_equal(new[k], old[k])
     # and what is renewed is what a build for these supports gives

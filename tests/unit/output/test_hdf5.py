@@ -54,17 +54,24 @@ def test_dataset_equals_that_of_h5py(name):
 
 
 @pytest.mark.parametrize("name", ["vector", "transposed", "part"])
-def test_checked_dataset_equals_that_of_h5py(name):
-    array = ARRAYS[name]
-    chunks = tuple(min(length, 4) for length in array.shape)
+@pytest.mark.parametrize("rows", [1, 2, 4, 5, 100])
+def test_checked_dataset_equals_that_of_h5py(name, rows):
+    """Written part by part, whether or not a number of chunks fills the dataset."""
+    array, asked = ARRAYS[name], []
+    chunks = (min(rows, len(array)), *array.shape[1:])
 
     def theirs(file):
-        file.create_dataset("a", data=array, chunks=chunks, fletcher32=True)
+        file.create_dataset("a", data=array, chunks=chunks, fletcher32=True, rdcc_nbytes=0)
+
+    def part(first, last):
+        asked.append(last - first)
+        return array[first:last]
 
     def ours(file):
-        hdf5.write_dataset(file.id, "a", array, chunks)
+        hdf5.write_checked(file.id, "a", part, len(array), rows)
 
     assert written(ours) == written(theirs)
+    assert max(asked) <= rows
 
 
 def test_links_equal_those_of_h5py():
