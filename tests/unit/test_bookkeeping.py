@@ -62,7 +62,7 @@ def simulation():
         step=20, steps_here=15, time=0.25, limit=StepLimit(0.125, 17, "energy"), totals=TOTALS,
         energy_drift=-0.01, energy_injected=13.0, energy_added=14.0, held_supports=3,
         volume_ratio=0.97, columns=dict, list_builds=6, clock=Clock(), scene=scene,
-        team=SimpleNamespace(threads=2), check_fields=lambda: None,
+        team=SimpleNamespace(threads=2), check_fields=lambda: None, end=lambda: None,
         particles=SimpleNamespace(
             number=100, position=np.ones((2, 4)), velocity=np.ones((2, 4)), mass=np.ones(4),
             density=np.ones(4),

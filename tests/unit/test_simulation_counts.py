@@ -77,7 +77,8 @@ def hollow(monkeypatch):
         one.sweep.team = SimpleNamespace(run=run)
         n, sums = one.particles.number, SimpleNamespace(volume=1.0)
         for name, result in (("order", np.arange(n)), ("guess", np.ones(n)), ("skin_for", 0.1),
-                             ("build", None), ("stale", True), ("widen", None)):  # fmt: skip
+                             ("build", None), ("stale", True), ("widen", None),
+                             ("forget", None)):  # fmt: skip
             replace(one.search, name, result)
         one.search.origin = Origin(one.particles.position, np.ones(n), 0.1)
         one.search.lists = SimpleNamespace(count=np.ones(1))

@@ -29,7 +29,7 @@ def quiet(**changed):
     )  # fmt: skip
     return SimpleNamespace(
         scene=SimpleNamespace(
-            config=config, physics=physics, domain=domain, all_parts=(),
+            config=config, physics=physics, domain=domain, all_parts=(), is_single=False,
             step_bounds=step_size.Bounds(0.1, "signal_speed", False, False, 0.25),
         ),
         particles=SimpleNamespace(**arrays), totals=totals, energy_drift=0.0, volume_ratio=None,
