@@ -106,3 +106,24 @@ def test_unstable_polytrope_has_no_period(gamma):
     assert mode.squared_frequency < 0.0
     with pytest.raises(ValueError, match="gamma above 4/3"):
         _ = mode.period
+
+
+@pytest.mark.parametrize(("index", "gamma"), [(1.0, MONATOMIC), (3.0, MONATOMIC), (1.0, 2.5)])
+def test_buoyancy_follows_from_profile(index, gamma):
+    star = Polytrope(index, 2.0, 3.0, 0.7)
+    r, step = np.linspace(0.3, 2.7, 9), 1e-4
+
+    def slope(function):
+        return np.log(function(r + step) / function(r - step)) / (2.0 * step)
+
+    pull = 0.7 * star.enclosed_mass(r) / r**2
+    expected = pull * (slope(star.pressure) / gamma - slope(star.density))
+    # central differences: step^2 times third derivatives of up to 100
+    np.testing.assert_allclose(star.squared_buoyancy(r, gamma), expected, rtol=1e-5)
+    assert np.all((expected < 0.0) == (gamma < 1.0 + 1.0 / index))
+
+
+def test_pressure_of_density_is_that_of_profile():
+    star = Polytrope(1.5, 2.0, 3.0, 0.7)
+    r = np.linspace(0.0, 2.9, 20)
+    np.testing.assert_allclose(star.pressure_of(star.density(r)), star.pressure(r), rtol=1e-12)
