@@ -12,6 +12,7 @@ from sph.config import Config
 from sph.domain import Domain
 from sph.errors import ConfigError
 from sph.formulations import Formulation
+from sph.integrators import individual
 from sph.integrators.step_size import Bounds
 from sph.part import STAGES, Part, Pass
 from sph.problems.base import InitialState
@@ -40,6 +41,11 @@ class Scene:
     @cached_property
     def eos(self):
         return self.physics.eos_model()
+
+    @property
+    def has_individual_steps(self) -> bool:
+        """Whether each particle has its own time step (`sph.integrators.individual`)."""
+        return self.config.time.stepping == "individual"
 
     @property
     def lanes(self):
@@ -77,7 +83,8 @@ class Scene:
     @cached_property
     def fields(self) -> tuple[Field, ...]:
         """The declarations of all arrays of the state."""
-        return tuple(field for part in self.all_parts for field in part.fields)
+        found = tuple(field for part in self.all_parts for field in part.fields)
+        return individual.fields(found, self.passes) if self.has_individual_steps else found
 
     @cached_property
     def passes(self) -> tuple[Pass, ...]:
@@ -102,7 +109,8 @@ class Scene:
         found = ["held_supports"] * (self.max_support < math.inf)
         found += ["volume_ratio"] * self.is_filled
         found += [name for part in self.all_parts for name in part.columns]
-        return (*found, *["energy_added"] * self.adds_energy)
+        found += ["energy_added"] * self.adds_energy
+        return (*found, *["shortest_step", "updates"] * self.has_individual_steps)
 
     @cached_property
     def is_filled(self) -> bool:
