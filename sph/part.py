@@ -69,7 +69,7 @@ class Evolved(NamedTuple):
     rule: Rule
 
 
-# The stages of a step, in order: with individual steps, prediction of particles that are not active;
+# The stages of a step, in order: prediction of inactive particles (individual steps);
 # density and quantities that follow from it; gradients, which need the density; rates of change;
 # additions to the rates.
 STAGES = ("prediction", "density", "gradients", "rates", "additions")

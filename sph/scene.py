@@ -12,7 +12,7 @@ from sph.config import Config
 from sph.domain import Domain
 from sph.errors import ConfigError
 from sph.formulations import Formulation
-from sph.integrators import individual
+from sph.integrators import bins
 from sph.integrators.step_size import Bounds
 from sph.part import STAGES, Part, Pass
 from sph.problems.base import InitialState
@@ -44,7 +44,7 @@ class Scene:
 
     @property
     def has_individual_steps(self) -> bool:
-        """Whether each particle has its own time step (`sph.integrators.individual`)."""
+        """Whether each particle has its own time step (`sph.individual`)."""
         return self.config.time.stepping == "individual"
 
     @property
@@ -84,7 +84,7 @@ class Scene:
     def fields(self) -> tuple[Field, ...]:
         """The declarations of all arrays of the state."""
         found = tuple(field for part in self.all_parts for field in part.fields)
-        return individual.fields(found, self.passes) if self.has_individual_steps else found
+        return bins.fields(found, self.passes) if self.has_individual_steps else found
 
     @cached_property
     def passes(self) -> tuple[Pass, ...]:

@@ -6,8 +6,8 @@ import numpy as np
 
 from sph import compile_cache, declarations, faults, passes, resolution, totals
 from sph.clock import STARTING, Clock
+from sph.individual import Individual
 from sph.integrators import leapfrog, step_size
-from sph.integrators.individual import Individual
 from sph.neighbours.order import number_of_blocks
 from sph.neighbours.search import Origin, Search
 from sph.part import Pass

@@ -132,7 +132,7 @@ class Search:
         self.reach_factor = 1.0 + origin.skin - 2.0 * moved
         return not self.reach_factor > grown
 
-    def skin_for(self, velocity, support, dt: float, share: float) -> float:
+    def skin_for(self, velocity: np.ndarray, support: np.ndarray, dt: float, share: float) -> float:
         """Return the skin for lists built now, for velocity (D, N), support (N,) and step dt.
 
         share: see `best_skin`.

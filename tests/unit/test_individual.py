@@ -6,8 +6,9 @@ import pytest
 from sph import config as configuration
 from sph.clock import Clock
 from sph.errors import NumericalError
-from sph.integrators import individual, limiter
-from sph.integrators.individual import TICKS, Individual
+from sph.individual import Individual
+from sph.integrators import bins, leapfrog, limiter
+from sph.integrators.bins import TICKS
 from sph.scene import Scene
 from sph.simulation import Simulation
 
@@ -82,7 +83,7 @@ def test_equal_steps_are_those_of_global_leapfrog(same_steps, alpha):
 def test_only_active_particles_change_in_a_tick(monkeypatch):
     one = simulation(BLAST, EACH)
     seen = []
-    correct = individual.leapfrog.correct_each
+    correct = leapfrog.correct_each
 
     def spy(state, evolved, own, team):
         s = state
@@ -95,7 +96,7 @@ def test_only_active_particles_change_in_a_tick(monkeypatch):
         seen.append(int((~idle).sum()))
         return given
 
-    monkeypatch.setattr(individual.leapfrog, "correct_each", spy)
+    monkeypatch.setattr(leapfrog, "correct_each", spy)
     one.advance(0.02)
     assert seen[-1] == one.particles.number  # all end together
     assert min(seen) < 100  # of 1024
@@ -166,7 +167,7 @@ def test_energy_error_falls_with_courant_number():
     ("length", "expected"), [(1.0, 1.0), (1.999, 1.0), (2.0, 2.0), (3.7e5, 2.0**18), (0.3, 0.25)]
 )
 def test_steps_are_powers_of_two(length, expected):
-    assert individual.power_of_two(length) == expected
+    assert bins.power_of_two(length) == expected
 
 
 def test_woken_step_ends_at_next_multiple_of_allowed_step():
@@ -175,7 +176,7 @@ def test_woken_step_ends_at_next_multiple_of_allowed_step():
     active = np.array([0.0, 0.0, 1.0])
     begin, end = np.array([0.0, 0.0, 16.0]), np.array([64.0, 64.0, 24.0])
     time_step = np.full(3, 100.0)
-    individual._begin_next(0, 3, 24.0, 1.0, length, allowed, active, time_step, begin, end)
+    bins.begin_next(0, 3, 24.0, 1.0, length, allowed, active, time_step, begin, end)
     assert end.tolist() == [28.0, 64.0, 32.0]  # 24 is a multiple of 8
     assert begin.tolist() == [0.0, 0.0, 24.0]
 
@@ -183,7 +184,7 @@ def test_woken_step_ends_at_next_multiple_of_allowed_step():
 def test_step_that_begins_late_is_shortened_to_a_multiple():
     length, allowed = np.array([64.0]), np.array([np.inf])
     begin, end, time_step = np.zeros(1), np.full(1, 24.0), np.ones(1)
-    individual._begin_next(0, 1, 24.0, 1.0, length, allowed, np.ones(1), time_step, begin, end)
+    bins.begin_next(0, 1, 24.0, 1.0, length, allowed, np.ones(1), time_step, begin, end)
     assert end[0] == 32.0
     assert TICKS % 32.0 == 0.0
 
