@@ -86,8 +86,14 @@ class Sweep:
             self.state.swap(*one.swaps)
 
     def _call(self, one: Pass, arrays: list[np.ndarray | None]) -> None:
-        """Call an uncompiled pass, on copies of the values of active particles if not all are."""
+        """Call an uncompiled pass.
+
+        If not all particles are active, it gets copies of the values of those that are.
+        """
         active = self.state.get("active")
+        if one.takes_sweep:
+            one.function(self, *arrays)
+            return
         if active is None or active.all():
             one.function(*arrays)
             return
