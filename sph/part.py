@@ -146,6 +146,7 @@ class Part:
     needs: tuple[str, ...] = ()  # fields that the formulation must compute for this part
     columns: tuple[str, ...] = ()  # of the history: the names in `energies` and `sums`
     keeps_momentum: bool = True
+    exact_pairs: bool = True  # whether forces of pairs are equal and opposite to round-off
     bounds_acceleration: bool = False  # whether |a| bounds the step
     adds_energy: bool = False  # whether `split` may add energy
     idle: tuple[str, ...] = ()  # those methods of IN_PYTHON that do nothing in this scene

@@ -98,6 +98,12 @@ class Scene:
         kept = all(part.keeps_momentum for part in self.all_parts)
         return np.array([kept and kind != "mirror" for kind in self.domain.boundaries], dtype=float)
 
+    @property
+    def inexact_momentum(self) -> list[str]:
+        """What makes forces of pairs differ from equal and opposite ones by more than round-off."""
+        found = [part.title for part in self.all_parts if not part.exact_pairs]
+        return found + ["individual time steps"] * self.has_individual_steps
+
     @cached_property
     def adds_energy(self) -> bool:
         """Whether a part adds energy, which does not count as energy drift."""
@@ -173,6 +179,10 @@ class Scene:
         for kind in parts.classes(self.physics.formulation):
             if kind not in given:
                 outside.append(f"{kind.title}: physics.{kind.keys[0].name} is not given")
+        if self.has_individual_steps:
+            inside.append("individual time steps")
+        else:
+            outside.append('individual time steps: time.stepping = "global"')
         limit = "time step limit u/|du/dt|"
         if self.physics.energy_limit:
             inside.append(limit)
