@@ -118,8 +118,6 @@ class Simulation:
         """
         self = cls(scene, particles, threads, clock)
         self.time, self.step = time, step
-        if self.individual is not None and not particles.time_step.any():
-            particles.time_step[:] = next_step  # the checkpoint is of a run with global steps
         self.limit = step_size.StepLimit(next_step, 0, "checkpoint")
         with clock.phase("lists"):
             self.search.build(origin, particles.id)

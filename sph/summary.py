@@ -102,7 +102,7 @@ class Cost(TypedDict):
     cpu_seconds: float
     wall_seconds: float
     threads: int  # of the last session
-    updates: int  # of a particle
+    updates: NotRequired[int]  # of a particle; not in summaries of earlier versions
     session: Session
 
 

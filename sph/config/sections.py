@@ -5,7 +5,7 @@ from typing import Annotated, ClassVar, Literal
 
 from pydantic import AfterValidator, Field
 
-from sph.config.restarts import FREE, RECORDED, class_of
+from sph.config.restarts import FREE, RECORDED, REFUSED, class_of
 from sph.problems.base import Section
 
 Count = Annotated[int, Field(ge=1)]
@@ -21,7 +21,7 @@ class Time(Section):
         description='time steps: "global", one step for all particles, or "individual", a step for '
         "each particle, which is faster where few particles need short steps; total energy and "
         "momentum are then conserved to the accuracy of the steps, not to round-off",
-        json_schema_extra=RECORDED,  # type: ignore[arg-type]
+        json_schema_extra=REFUSED,  # type: ignore[arg-type]
     )
 
 

@@ -29,7 +29,6 @@ FIELDS = (
     Field(
         "time_step",
         above=0.0,
-        remade=True,
         public=Public("TimeSteps", 0, 0, 1, 0, "Time step that the state of the particle allows"),
     ),
     Field("step_begin", stored=False),  # in ticks of the present long step

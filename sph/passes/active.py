@@ -1,4 +1,4 @@
-"""The particles that a pass computes: all, or with individual time steps those that are active.
+"""The particles that a pass computes: all or, with individual steps, the active ones.
 
 `active` is None if all particles are computed, which leaves no code. Otherwise it is an array (N,)
 that is 1.0 for particles whose time step ends now, and 0.0 for others.

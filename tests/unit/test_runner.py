@@ -805,6 +805,18 @@ def test_energy_limit_applies_from_first_step_of_restart(tmp_path):
     assert then - first == pytest.approx(allowed, rel=1e-9)
 
 
+def test_changed_limits_apply_to_individual_steps_of_restart(tmp_path):
+    free = EACH.replace("[physics]\n", "[physics]\nenergy_limit = false\n")
+    run = start(free.replace("end = 0.032", "end = 0.008"), tmp_path / "run")
+    last = checkpoints.read(run.latest())
+    before, p = last.particles.time_step.copy(), last.particles
+    allowed = 0.015 * p.internal_energy / np.abs(p.energy_rate)
+    assert (allowed < 0.4 * before).any()  # else this shows nothing
+    changed = last.config.override(["physics.C=0.015", "physics.energy_limit=true"])
+    assert restarting._coming_step(changed, last) == pytest.approx(0.5 * last.next_step)
+    np.testing.assert_allclose(p.time_step, np.minimum(0.5 * before, allowed))
+
+
 def test_energy_limit_of_restart_ignores_gas_without_energy(tmp_path):
     """Cooling may take u to 0 by rounding. Such a particle sets no step, here as in any step."""
     run = start(TUBE.replace("end = 0.2", "end = 0.05") + "[physics]\nenergy_limit = false\n",
