@@ -76,6 +76,9 @@ class Pass(NamedTuple):
         function(first, last, dim, models, neighbours, *arrays)    if Numba compiled it, for blocks
                                                                    [first, last) (`sph.passes`)
         function(*arrays)                                          otherwise, once for all particles
+        function(sweep, *arrays)                                   otherwise, if `takes_sweep`; such
+                                                                   a function calls compiled ones
+                                                                   by `sph.passes.Sweep.run`
 
     The function must set every value of each field in `writes`, and changes arrays in place. A
     field that each step writes before it reads it is not reordered when the memory order of
@@ -92,6 +95,7 @@ class Pass(NamedTuple):
     widens: bool = False  # takes `wanted` as last argument (`sph.passes.Sweep`)
     at_start: bool = True  # also run before the first step
     takes_step: bool = False  # takes the length of the step as last argument
+    takes_sweep: bool = False  # an uncompiled function that takes the sweep as first argument
     models_at_start: Any = None  # before the first step, if not those of the formulation
 
     @property

@@ -59,7 +59,7 @@ class Sweep:
         """Run a pass once. If it requests wider lists, `swaps` waits until it has them."""
         arrays = [None if name is None else getattr(self.state, name) for name in one.arrays]
         if not is_jitted(one.function):
-            one.function(*arrays)
+            one.function(*[self] * one.takes_sweep, *arrays)
             return
         models = self.models
         # Before the first step supports are guesses and must converge. Only the pass that finds
