@@ -71,7 +71,7 @@ def _evolve(faces, state, gamma, G, end):
         count += 1
         if time >= end:
             return rows[:count]
-        dt = min(_longest_step(faces, state, gamma), end - time)
+        dt = min(_longest_step(faces, state, attraction, gamma), end - time)
         time = time + dt if dt < end - time else end
         limit_changes(state, True, False, change)
         _rates(faces, state, attraction, gamma, change, rate)
@@ -87,14 +87,15 @@ def _evolve(faces, state, gamma, G, end):
 
 
 @njit(**COMPILED)
-def _longest_step(faces, state, gamma):
-    """Return the longest time step: no face moves more than part of a cell, no wave crosses one."""
+def _longest_step(faces, state, attraction, gamma):
+    """Return the longest time step, in which waves, gas and free fall cross part of a cell."""
     n, dt = state.shape[1], np.inf
     for i in range(n):
         inner = state[1, i - 1] if i > 0 else -state[1, 0]
         closing = max(0.0, inner - state[1, min(i + 1, n - 1)])
         c = np.sqrt(gamma * state[2, i] / state[0, i])
-        dt = min(dt, COURANT * (faces[i + 1] - faces[i]) / (c + closing))
+        width, fall = faces[i + 1] - faces[i], attraction[i + 1] / faces[i + 1] ** 2
+        dt = min(dt, COURANT * min(width / (c + closing), np.sqrt(2.0 * width / fall)))
     return dt
 
 

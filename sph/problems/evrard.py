@@ -22,6 +22,7 @@ _SHARED = base.Problem.model_fields
 # wide as the radius and the density depends on the number of particles; outside, they reach into
 # the vacuum.
 KEPT = (0.05, 0.9)
+GROUP = 32  # particles over whose radial velocities the median is taken, to find the shock
 ENERGIES = ("kinetic", "internal", "gravitational")
 
 
@@ -129,10 +130,21 @@ class Problem(base.Problem):
         }
 
     def departs(self, physics) -> str | None:
+        gamma = physics.eos_model().gamma
+        if gamma < evrard.LEAST_GAMMA:
+            return (
+                f"the reference is computed for gamma of at least {evrard.LEAST_GAMMA:g}, but "
+                f"physics.gamma is {gamma:g}"
+            )
         return base.other_physics(physics, besides="gravity")
 
+    def exact_ends(self, eos) -> tuple[float, str]:
+        return evrard.LAST_TIME * self.units.time, "the computation of the reference ends"
+
     def error_region(self, eos, time: float, position: np.ndarray) -> tuple[np.ndarray, str]:
-        """Return the gas without its centre and its outer end."""
+        """Return the gas without its centre and its outer end, where there is a reference."""
+        if eos.gamma < evrard.LEAST_GAMMA or time > self.exact_ends(eos)[0]:
+            return super().error_region(eos, time, position)
         cells = self._reference(eos, time)[0]
         low, high = self.radius * evrard.radius_of_mass(cells, KEPT)
         offset = position - self.centre[:, None]
@@ -161,12 +173,13 @@ class Problem(base.Problem):
         return figures
 
     def theory(self, eos, times: np.ndarray) -> dict[str, np.ndarray]:
-        """Return the energies of the reference at `times` (M,)."""
-        units, energies = self.units, self._reference(eos, float(times[-1]))[1]
+        """Return the energies of the reference at `times` (M,), NaN after its end."""
+        units, energies = self.units, self._energies(eos, times)
         at = times / units.time
         unit = units.mass * units.speed**2
         return {
-            f"{name}_energy": unit * np.interp(at, energies.time, getattr(energies, name))
+            f"{name}_energy": unit
+            * np.interp(at, energies.time, getattr(energies, name), right=np.nan)
             for name in ENERGIES
         }
 
@@ -178,10 +191,10 @@ class Problem(base.Problem):
         """
         times, units = history["t"], self.units
         by_run = evrard.extremes(times, *(history[f"{name}_energy"] for name in ENERGIES))
-        energies = self._reference(eos, float(times[-1]))[1]
+        energies = self._energies(eos, times)
         expected = evrard.extremes(energies.time, *(getattr(energies, name) for name in ENERGIES))
         unit = units.mass * units.speed**2
-        figures = {}
+        figures: dict[str, float] = {}
         for name in by_run.keys() & expected.keys():
             (found_time, found), (time, value) = by_run[name], expected[name]
             figures |= _compared(name, found, unit * value)
@@ -192,6 +205,10 @@ class Problem(base.Problem):
         """Return the reference in units of G, M and R."""
         units = self.units
         return evrard.solve(eos.gamma, self.energy / units.speed**2, time / units.time)
+
+    def _energies(self, eos, times: np.ndarray) -> sphere.Energies:
+        """Return the energies of the reference until the last of `times` or its own end."""
+        return self._reference(eos, min(float(times[-1]), self.exact_ends(eos)[0]))[1]
 
     def _radial(self, particles) -> tuple[np.ndarray, np.ndarray]:
         """Return distances from the centre and radial velocities (N,) of particles."""
@@ -216,11 +233,11 @@ class Units(NamedTuple):
 def _crossing(radius: np.ndarray, speed: np.ndarray, level: float) -> float:
     """Return where the radial velocity rises above `level`, inwards from its lowest value.
 
-    radius, speed: (N,) of particles, of which groups of N^(1/2) neighbours are averaged. NaN if the
+    radius, speed: (N,) of particles, of which GROUP neighbours in radius count as one. NaN if the
     velocity is below `level` everywhere inside.
     """
     order = np.argsort(radius)
-    groups = np.array_split(order, max(1, round(np.sqrt(radius.size))))
+    groups = np.array_split(order, max(1, radius.size // GROUP))
     at = np.array([radius[group].mean() for group in groups])
     mean = np.array([np.median(speed[group]) for group in groups])
     lowest = int(np.argmin(mean))

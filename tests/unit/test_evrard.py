@@ -40,17 +40,17 @@ def ideal(shells, n):
 # --- initial state ----------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("lattice", ["cubic", "bcc", "relaxed"])
-def test_particles_have_density_inverse_to_radius(lattice):
-    state = Problem(n=4000, lattice=lattice, mass=2.0, domain=[0.0, 2.0]).initial(MONATOMIC)
+@pytest.mark.parametrize(("lattice", "n"), [("cubic", 4000), ("bcc", 4000), ("relaxed", 1000)])
+def test_particles_have_density_inverse_to_radius(lattice, n):
+    state = Problem(n=n, lattice=lattice, mass=2.0, domain=[0.0, 2.0]).initial(MONATOMIC)
     radius = np.linalg.norm(state.position - 1.0, axis=0)
     assert state.mass.sum() == pytest.approx(2.0, rel=1e-12)
     assert np.ptp(state.mass) == 0.0
     # no particle at the centre, where the density is infinite, and the outermost at the surface
-    assert radius.min() > 0.3 * (1.0 / 4000) ** 0.5
+    assert radius.min() > 0.3 * n**-0.5
     assert 0.99 < radius.max() < 1.001
     for reach in (0.3, 0.5, 0.8):
-        # the ball of a lattice is ragged by part of a layer, of 20 along the diameter
+        # the ball of a lattice is ragged by part of a layer, of 12 to 20 along the diameter
         assert np.mean(radius < reach) == pytest.approx(reach**2, rel=0.08)
     assert np.all(state.internal_energy == 0.05)
     assert np.all(state.velocity == 0.0)
@@ -71,7 +71,7 @@ def test_reference_scales_with_units():
     found = scaled.exact(MONATOMIC, 0.9 * TIME, 1.0 + 2.0 * x)
     unit = {"density": 3.0 / 8.0, "velocity": SPEED, "pressure": 6.0 * 3.0 / 8.0}
     for name, values in (unit | {"internal_energy": 6.0}).items():
-        # time is rounded, and the shock moves by 1e-16
+        # round-off of the time, times the slopes at the shock
         np.testing.assert_allclose(found[name], values * expected[name], rtol=1e-6)
     times = np.array([0.0, 0.5, 1.1])
     for name, energy in scaled.theory(MONATOMIC, TIME * times).items():
@@ -107,6 +107,15 @@ def test_other_physics_than_gravity_departs():
     assert "physics.heating" in truth.departure(config.from_text(KEYS).override([heated]), 1.0)
 
 
+def test_reference_is_left_out_for_gas_that_collapses_too_far():
+    soft = config.from_text(KEYS).override(["physics.gamma=1.4"])
+    assert "gamma of at least 1.6" in truth.departure(soft, 1.0)
+    gas = soft.physics.eos_model()
+    x = np.zeros((3, 2))
+    for there, time in ((gas, 1.0), (MONATOMIC, 10.1)):
+        assert soft.problem.error_region(there, time, x)[1] == "the whole domain"
+
+
 # --- figures ----------------------------------------------------------------------------------
 
 
@@ -115,9 +124,10 @@ def test_shock_radius_of_particles_on_reference_is_that_of_reference(time):
     shells, _ = evrard.solve(MONATOMIC.gamma, 0.05, time)
     found = problem().compare(MONATOMIC, time, ideal(shells, 10000), None)
     published = {0.77: 0.1256, 0.8: 0.136, 1.17: 0.4255}[time]
-    assert found["shock_radius_reference"] == pytest.approx(published, rel=2e-3)
-    # groups of 100 of 10,000 particles are 0.5 % to 1 % of that radius apart
-    assert found["shock_radius_error"] < 0.01
+    # a shell has 0.3 % of the radius there
+    assert found["shock_radius_reference"] == pytest.approx(published, rel=4e-3)
+    # groups of 32 of 10,000 particles are up to 3 % of that radius apart
+    assert found["shock_radius_error"] < 0.02
     assert found["half_mass_radius_error"] < 1e-3
 
 
