@@ -28,6 +28,7 @@ STEPS = 300
 SMALL = {
     "blob": ["problem.n=2500"],
     "contrast_graded": ["problem.n=2000"],
+    "evrard": ["problem.n=1000"],
     "expanding_ball": ["problem.n=1000"],
     "gresho": ["problem.n=1024"],
     "kelvin_helmholtz": ["problem.n=3000"],

@@ -116,6 +116,7 @@ class Gravity(Part):
     balances_pressure = True
     columns = ("gravitational_energy",)
     bounds_acceleration = True
+    exact_pairs = False  # a node acts on particles that do not act on it
 
     def __init__(self, expansion, kernel, weighting):
         self.expansion = expansion

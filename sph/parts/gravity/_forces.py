@@ -16,6 +16,7 @@ from sph.kernels import dw_over_q, enclosed_over_q3, normalisation, potential_de
 from sph.neighbours.order import BLOCK
 from sph.parts.gravity import attraction, moments
 from sph.parts.gravity._tree import CENTRE, MASS, Q, walk
+from sph.passes.active import any_active, is_active
 from sph.passes.blocks import load_column, move
 from sph.passes.gather import (
     FAR,
@@ -94,6 +95,8 @@ def attract(
     for group in range(first, last):
         begin, end = nodes.groups[group], nodes.groups[group + 1]
         i_0, i_end = begin * BLOCK, min(end * BLOCK, mass.size)
+        if not any_active(neighbours.active, i_0, i_end):
+            continue
         size = _box_of(neighbours.boxes, begin, end, box)
         reach = largest_of(support, i_0, i_end)
         n_far, n_near = walk(nodes, box, reach, expansion.opening_angle, far_nodes, near_blocks)
@@ -130,6 +133,8 @@ def attract(
         for block in range(begin, end):
             low, high = own_box(dim, neighbours, block, x_0, per_length)
             i_first, i_last = block * BLOCK, min((block + 1) * BLOCK, mass.size)
+            if not any_active(neighbours.active, i_first, i_last):
+                continue
             reach = largest_of(support, i_first, i_last) * per_length
             n_in, n_out = _sort_blocks(lanes, dim, boxes, n_near, low, high, reach, inside, outside)
             n_plain = _copy_points(lanes, point, copied, len(every), outside, n_out, plain)
@@ -138,6 +143,8 @@ def attract(
                 n_plain,
             )  # fmt: skip
             for i in range(i_first, i_last):
+                if not is_active(neighbours.active, i):
+                    continue
                 x_i = times(minus(at(dim, position, i), x_0), per_length)
                 total, depth = zeros(lanes, dim), filled(lanes, 0.0)
                 for k in range(0, n_far, width(lanes)):

@@ -6,6 +6,7 @@ from sph.compiled import COMPILED, INLINED, smaller
 from sph.formulations.gas.weighting import mass_per_weight
 from sph.kernels import enclosed_over_q3, potential_depth
 from sph.neighbours.order import BLOCK
+from sph.passes.active import any_active, is_active
 from sph.passes.gather import (
     TINY,
     copy_box,
@@ -49,6 +50,8 @@ def find_zeta(
     for superblock in range(first, last):
         begin, end = lists.first[superblock], lists.first[superblock + 1]
         i_0, i_end = begin * BLOCK, min(end * BLOCK, mass.size)
+        if not any_active(neighbours.active, i_0, i_end):
+            continue
         x_0 = middle(dim, neighbours, begin, end)
         per_length = unit(largest_of(support, i_0, i_end))
         per_mass = unit(largest_of(mass, i_0, i_end))
@@ -62,12 +65,16 @@ def find_zeta(
         for block in range(begin, end):
             low, high = own_box(dim, neighbours, block, x_0, per_length)
             i_first, i_last = block * BLOCK, min((block + 1) * BLOCK, mass.size)
+            if not any_active(neighbours.active, i_first, i_last):
+                continue
             reach = largest_of(support, i_first, i_last) * per_length
             blocks = near_blocks(lanes, dim, boxes, number, low, high, reach, chosen)
             nc = near_particles(
                 lanes, dim, copied, fields, 0, chosen, blocks, low, high, reach, near
             )
             for i in range(i_first, i_last):
+                if not is_active(neighbours.active, i):
+                    continue
                 x_i = times(minus(at(dim, position, i), x_0), per_length)
                 H_inv = 1.0 / (support[i] * per_length)
                 slope = _by_support(lanes, dim, models.kernel, near, nc, x_i, H_inv)
