@@ -11,9 +11,7 @@ from typing import Annotated, ClassVar, Literal
 import numpy as np
 from pydantic import Field
 
-from sph import registry
 from sph.exact import rayleigh_taylor as linear
-from sph.parts.external.uniform import Uniform
 from sph.problems import base
 from sph.problems.base import only
 from sph.problems.support.lattice import fill
@@ -24,7 +22,7 @@ DOMAIN = [[-0.25, 0.25], [-0.5, 0.5]]
 WAVENUMBER = 4.0 * np.pi  # one wavelength across the box
 DENSITY = (1.0, 2.0)  # below, above
 GRAVITY = 0.5
-FIELD = Uniform(g=(0.0, -GRAVITY))
+FIELD = {"name": "uniform", "g": [0.0, -GRAVITY]}
 PRESSURE = 10.0 / 7.0  # at y = 0: with gamma = 1.4, sound there is as fast as 1 in the heavy gas
 # Interval of time in which growth is measured. With the default perturbation, displacements are
 # then below 0.013, a tenth of 1/WAVENUMBER and half the default width of the transition.
@@ -41,7 +39,7 @@ class Problem(base.Problem):
         "physics.eta": 2.4,
         "physics.alpha": 0.5,
         "physics.density": "number",
-        "physics.external": {"name": "uniform", "g": [0.0, -GRAVITY]},
+        "physics.external": FIELD,
         "time.end": 6.0,
         "output.interval": 1.0,
     }
@@ -101,9 +99,9 @@ class Problem(base.Problem):
         return base.InitialState(position, velocity, mass, eos.internal_energy(density, pressure))
 
     def departs(self, physics) -> str | None:
-        if registry.model("sph.parts.external", physics.external) != FIELD:
+        if physics.external != FIELD:
             return (
-                f"linear theory is for a uniform field of {list(FIELD.g)}, but physics.external is "
+                f"linear theory is for a uniform field [0.0, {-GRAVITY}], but physics.external is "
                 "another field"
             )
         return base.other_physics(physics, besides="external")

@@ -1,6 +1,6 @@
-"""Uniform field: a constant acceleration g everywhere, with the potential -g.r (0 at the origin).
+"""Uniform field: a constant acceleration g everywhere.
 
-Source: textbooks, e.g. Landau & Lifshitz (1987), section 3.
+Its potential is -g.r, which is zero at the origin (eq 92).
 """
 
 from typing import Annotated, NamedTuple
