@@ -47,10 +47,17 @@ class Rule(NamedTuple):
     advances `value` by the second half step, with the new rate. mass: (N,), other arrays: (rows,
     N), where a scalar has one row. Both functions return the energy that they added in addition to
     the rate, summed over these particles.
+
+    With individual time steps: predict_each(first, last, since, own, value, rate, mass, predicted)
+    sets `predicted` to the value a time `since` after the beginning of each particle's step, and
+    advances `value` by half of `own`; correct_each(first, last, own, value, rate, mass) advances
+    `value` by the second half. since, own: (N,); `own` is 0 for particles whose step has not ended.
     """
 
     predict: Callable[..., float]
     correct: Callable[..., float]
+    predict_each: Callable[..., float]
+    correct_each: Callable[..., float]
 
 
 class Evolved(NamedTuple):
@@ -62,9 +69,10 @@ class Evolved(NamedTuple):
     rule: Rule
 
 
-# The stages of a step, in order: density and quantities that follow from it; gradients, which need
-# the density; rates of change; additions to the rates.
-STAGES = ("density", "gradients", "rates", "additions")
+# The stages of a step, in order: prediction of inactive particles (individual steps);
+# density and quantities that follow from it; gradients, which need the density; rates of change;
+# additions to the rates.
+STAGES = ("prediction", "density", "gradients", "rates", "additions")
 
 
 class Pass(NamedTuple):
@@ -76,6 +84,9 @@ class Pass(NamedTuple):
         function(first, last, dim, models, neighbours, *arrays)    if Numba compiled it, for blocks
                                                                    [first, last) (`sph.passes`)
         function(*arrays)                                          otherwise, once for all particles
+        function(sweep, *arrays)                                   otherwise, if `takes_sweep`; such
+                                                                   a function calls compiled ones
+                                                                   by `sph.passes.Sweep.run`
 
     The function must set every value of each field in `writes`, and changes arrays in place. A
     field that each step writes before it reads it is not reordered when the memory order of
@@ -92,6 +103,7 @@ class Pass(NamedTuple):
     widens: bool = False  # takes `wanted` as last argument (`sph.passes.Sweep`)
     at_start: bool = True  # also run before the first step
     takes_step: bool = False  # takes the length of the step as last argument
+    takes_sweep: bool = False  # an uncompiled function that takes the sweep as first argument
     models_at_start: Any = None  # before the first step, if not those of the formulation
 
     @property
@@ -134,6 +146,7 @@ class Part:
     needs: tuple[str, ...] = ()  # fields that the formulation must compute for this part
     columns: tuple[str, ...] = ()  # of the history: the names in `energies` and `sums`
     keeps_momentum: bool = True
+    exact_pairs: bool = True  # whether forces of pairs are equal and opposite to round-off
     bounds_acceleration: bool = False  # whether |a| bounds the step
     adds_energy: bool = False  # whether `split` may add energy
     idle: tuple[str, ...] = ()  # those methods of IN_PYTHON that do nothing in this scene

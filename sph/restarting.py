@@ -123,15 +123,21 @@ def _coming_step(config: Config, checkpoint: Checkpoint) -> float:
     now, before, p = config.physics, checkpoint.config.physics, checkpoint.particles
     scene = Scene(config)
     held, held_before = (s.step_bounds.courant for s in (scene, Scene(checkpoint.config)))
-    step = checkpoint.next_step * (held / held_before)  # unchanged where both are: bit for bit
+    ratio = held / held_before  # 1 if unchanged: bit for bit
+    step = checkpoint.next_step * ratio
+    if (each := p.get("time_step")) is not None:  # of individual steps
+        each *= ratio
     if step > checkpoint.next_step:
         limit = step_size.StepLimit(step, 0, "checkpoint")
         step = step_size.before_contact(limit, scene.step_bounds, p, scene.domain).dt
     if now.energy_limit and not before.energy_limit:
         warm = p.internal_energy > 0.0  # as in step_size: u = 0 does not limit the step
         with np.errstate(divide="ignore"):
-            times = p.internal_energy[warm] / np.abs(p.energy_rate[warm])
-        step = min(step, float(held * np.min(times, initial=np.inf)))
+            times = held * p.internal_energy[warm] / np.abs(p.energy_rate[warm])
+        if each is not None:
+            each[warm] = np.minimum(each[warm], times)
+        else:
+            step = min(step, float(np.min(times, initial=np.inf)))
     return step
 
 

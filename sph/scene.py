@@ -12,6 +12,7 @@ from sph.config import Config
 from sph.domain import Domain
 from sph.errors import ConfigError
 from sph.formulations import Formulation
+from sph.integrators import bins
 from sph.integrators.step_size import Bounds
 from sph.part import STAGES, Part, Pass
 from sph.problems.base import InitialState
@@ -40,6 +41,11 @@ class Scene:
     @cached_property
     def eos(self):
         return self.physics.eos_model()
+
+    @property
+    def has_individual_steps(self) -> bool:
+        """Whether each particle has its own time step (`sph.individual`)."""
+        return self.config.time.stepping == "individual"
 
     @property
     def lanes(self):
@@ -77,7 +83,8 @@ class Scene:
     @cached_property
     def fields(self) -> tuple[Field, ...]:
         """The declarations of all arrays of the state."""
-        return tuple(field for part in self.all_parts for field in part.fields)
+        found = tuple(field for part in self.all_parts for field in part.fields)
+        return bins.fields(found, self.passes) if self.has_individual_steps else found
 
     @cached_property
     def passes(self) -> tuple[Pass, ...]:
@@ -91,6 +98,12 @@ class Scene:
         kept = all(part.keeps_momentum for part in self.all_parts)
         return np.array([kept and kind != "mirror" for kind in self.domain.boundaries], dtype=float)
 
+    @property
+    def inexact_momentum(self) -> list[str]:
+        """What makes forces of pairs differ from equal and opposite ones by more than round-off."""
+        found = [part.title for part in self.all_parts if not part.exact_pairs]
+        return found + ["individual time steps"] * self.has_individual_steps
+
     @cached_property
     def adds_energy(self) -> bool:
         """Whether a part adds energy, which does not count as energy drift."""
@@ -102,7 +115,8 @@ class Scene:
         found = ["held_supports"] * (self.max_support < math.inf)
         found += ["volume_ratio"] * self.is_filled
         found += [name for part in self.all_parts for name in part.columns]
-        return (*found, *["energy_added"] * self.adds_energy)
+        found += ["energy_added"] * self.adds_energy
+        return (*found, *["shortest_step", "updates"] * self.has_individual_steps)
 
     @cached_property
     def is_filled(self) -> bool:
@@ -165,6 +179,10 @@ class Scene:
         for kind in parts.classes(self.physics.formulation):
             if kind not in given:
                 outside.append(f"{kind.title}: physics.{kind.keys[0].name} is not given")
+        if self.has_individual_steps:
+            inside.append("individual time steps")
+        else:
+            outside.append('individual time steps: time.stepping = "global"')
         limit = "time step limit u/|du/dt|"
         if self.physics.energy_limit:
             inside.append(limit)

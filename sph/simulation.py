@@ -6,6 +6,7 @@ import numpy as np
 
 from sph import compile_cache, declarations, faults, passes, resolution, totals
 from sph.clock import STARTING, Clock
+from sph.individual import Individual
 from sph.integrators import leapfrog, step_size
 from sph.neighbours.order import number_of_blocks
 from sph.neighbours.search import Origin, Search
@@ -41,6 +42,7 @@ class Simulation:
         self.time = 0.0
         self.step = 0
         self.steps_here = 0  # since the start or the last restart
+        self.updates_here = 0  # of particles, in these steps
         self.list_builds = 0
         self.held_supports = 0  # number of particles whose support is limited by max_support
         # set by `begin` or `resume`
@@ -56,7 +58,9 @@ class Simulation:
         for part in scene.all_parts:
             part.remake(particles, missing)
         self.evolved = tuple(one for part in scene.all_parts for one in part.evolved)
-        self._carried = carried(scene)
+        # with individual steps, passes write the fields of active particles only
+        names = tuple(field.name for field in scene.fields)
+        self._carried = names if scene.has_individual_steps else carried(scene)
         self._reflected = [
             field for field in scene.fields if field.rank and field.name in self._carried
             and field.name != "position"
@@ -64,6 +68,7 @@ class Simulation:
         self.sweep = passes.Sweep(
             particles, self.team, number_of_blocks(particles.number), scene.formulation.models
         )
+        self.individual = Individual(self) if scene.has_individual_steps else None
         self.rows: list[rows.Columns] = []  # of the history, not yet recorded
         self._steps = Steps(self)
 
@@ -97,7 +102,9 @@ class Simulation:
                 resolution.check(self)
         self.sweep.is_start = False
         declarations.check_returned(self.scene.all_parts, self.particles)
-        self._measure(past=None)
+        if self.individual is not None:
+            self.individual.begin()
+        self.measure()
         self.check_fields()
 
     @classmethod
@@ -134,12 +141,16 @@ class Simulation:
     def advance(self, until: float) -> None:
         """Take one time step (steps 1-9 of docs/equations.md), which ends at `until` or earlier.
 
-        Raises NumericalError if the new state is unphysical.
+        With individual steps, that is one long step. Raises NumericalError if the new state is
+        unphysical.
         """
+        if self.individual is not None:
+            self.individual.advance(until)
+            return
         dt, lands = step_size.next_step(self.time, self.limit.dt, until)
         p = self.particles
         with self.clock.phase("predict, correct"):
-            self._split(dt / 2)
+            self.split(dt / 2)
             self.energy_injected += leapfrog.predict(p, self.evolved, dt, self.team)
             for part in self.scene.all_parts:
                 part.split_predicted(p, dt / 2)
@@ -180,15 +191,45 @@ class Simulation:
         """Do what follows the lists in a step of length dt, which ends at the time `end`."""
         p, allowed = self.particles, self.limit.dt
         self.sweep.dt = dt
-        for one in self.scene.passes:
-            self._make(one)
+        self.make_passes()
         with self.clock.phase("predict, correct"):
             self.energy_injected += leapfrog.correct(p, self.evolved, dt, self.team)
-            self._split(dt / 2)
+        self.end_step(dt, end, step_size.Past(dt, allowed))
+
+    def make_passes(self) -> None:
+        """Run the passes of a step, with the lists that they need."""
+        for one in self.scene.passes:
+            self._make(one)
+
+    def split(self, dt: float) -> None:
+        """Apply the sources that are integrated apart from the flow, for half a step."""
+        for part in self.scene.all_parts:
+            self.energy_added += part.split(self.particles, dt)
+
+    def end_step(self, dt: float, end: float, past: step_size.Past | None = None) -> None:
+        """Do what follows the correction in a step of length dt, which ends at the time `end`."""
+        with self.clock.phase("predict, correct"):
+            self.split(dt / 2)
         self.step += 1
         self.steps_here += 1
+        self.updates_here += self.individual.updates if self.individual else self.particles.number
         self.time = end
-        self._measure(step_size.Past(dt, allowed))
+        self.measure(past)
+
+    def measure(self, past: step_size.Past | None = None) -> None:
+        """Do step 8: totals, energy drift, the next step, and the watchdog's checks."""
+        with self.clock.phase("step size, sums"):
+            scene, p = self.scene, self.particles
+            self.totals = totals.of(p, scene.all_parts, scene.keeps_momentum, self.team)
+            if self.baseline is None:
+                self.baseline = totals.Baseline.at(self.totals, self.energy_added)
+            self.energy_drift = self.baseline.drift(self.totals, self.energy_added)
+            if self.individual is not None:
+                self.limit = self.individual.limit()
+            else:
+                limit = step_size.limit(scene.step_bounds, p, scene.all_parts, past, self.team)
+                self.limit = step_size.before_contact(limit, scene.step_bounds, p, scene.domain)
+            self.watchdog.check(self)
 
     def check_fields(self) -> None:
         """Raise an error for a stored field that could not be read back from a checkpoint."""
@@ -221,6 +262,8 @@ class Simulation:
             found["volume_ratio"] = self.volume_ratio
         if scene.adds_energy:
             found["energy_added"] = self.energy_added
+        if self.individual is not None:
+            found |= self.individual.columns()
         for part in scene.all_parts:
             found |= part.sums(self.particles)
         for name, value in found.items():
@@ -249,7 +292,8 @@ class Simulation:
             if guess:
                 models = self.scene.formulation.models
                 p.support = self.search.guess(p.position, models.support_ratio * models.eta)
-            skin = self.search.skin_for(p.predicted_velocity, p.support, dt)
+            share = 1.0 if self.individual is None else self.individual.share
+            skin = self.search.skin_for(p.predicted_velocity, p.support, dt, share)
             self.search.build(Origin(p.position.copy(), p.support.copy(), skin), p.id)
         self._steps.has_new_lists = True
 
@@ -266,12 +310,13 @@ class Simulation:
             search.origin.support,
             search.reach_factor,
             self.scene.lanes,
+            self.particles.get("active"),
         )
 
     def _make(self, one: Pass) -> None:
         """Run a pass, and repeat it with wider lists as long as it requests them."""
         sweep, p = self.sweep, self.particles
-        sweep.wanted.fill(1.0)
+        sweep.want_all(one)
         for _ in range(MAX_WIDENINGS if one.widens else 1):
             sweep.neighbours = self.neighbours()
             with self.clock.phase(one.phase):
@@ -294,23 +339,6 @@ class Simulation:
             self.held_supports = int(np.count_nonzero(p.support == most))
         if p.density.min() < 0.0:
             raise faults.crowded(self)
-
-    def _split(self, dt: float) -> None:
-        """Apply the sources that are integrated apart from the flow, for half a step."""
-        for part in self.scene.all_parts:
-            self.energy_added += part.split(self.particles, dt)
-
-    def _measure(self, past: step_size.Past | None) -> None:
-        """Do step 8: totals, energy drift, the next step, and the watchdog's checks."""
-        with self.clock.phase("step size, sums"):
-            scene, p = self.scene, self.particles
-            self.totals = totals.of(p, scene.all_parts, scene.keeps_momentum, self.team)
-            if self.baseline is None:
-                self.baseline = totals.Baseline.at(self.totals, self.energy_added)
-            self.energy_drift = self.baseline.drift(self.totals, self.energy_added)
-            limit = step_size.limit(scene.step_bounds, p, scene.all_parts, past, self.team)
-            self.limit = step_size.before_contact(limit, scene.step_bounds, p, scene.domain)
-            self.watchdog.check(self)
 
 
 def carried(scene: Scene) -> tuple[str, ...]:

@@ -86,7 +86,7 @@ class Session(TypedDict):
     """Cost of the last session, that is of one call of `sph run` or `sph restart`."""
 
     steps: int
-    updates: int  # particles times steps
+    updates: int  # of a particle: particles times steps, unless steps are individual
     updates_per_cpu_second: int | None
     cpu_seconds: float
     wall_seconds: float
@@ -102,6 +102,7 @@ class Cost(TypedDict):
     cpu_seconds: float
     wall_seconds: float
     threads: int  # of the last session
+    updates: NotRequired[int]  # of a particle; not in summaries of earlier versions
     session: Session
 
 

@@ -119,11 +119,12 @@ def cost(simulation, history) -> Cost:
     """The cost of the run, from its history, and of this session, from the simulation's clock."""
     clock = simulation.clock
     phases = {name: round(seconds, 4) for name, seconds in clock.seconds.items()}
-    updates = simulation.particles.number * simulation.steps_here
+    updates = simulation.updates_here
     return {
         "cpu_seconds": float(history["cpu_seconds"][-1]),
         "wall_seconds": float(history["wall_seconds"][-1]),
         "threads": simulation.team.threads,
+        "updates": _updates(history, simulation.particles.number),
         "session": {
             "steps": simulation.steps_here,
             "updates": updates,
@@ -136,6 +137,13 @@ def cost(simulation, history) -> Cost:
             "peak_memory_bytes": peak_memory(),
         },
     }
+
+
+def _updates(history, number: int) -> int:
+    """Return the number of updates of a particle in the whole run."""
+    if "updates" in history:
+        return int(history["updates"].sum())
+    return number * int(history["step"][-1])
 
 
 def peak_memory() -> int:

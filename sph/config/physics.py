@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 from pydantic import Field, create_model, model_validator
 
 from sph import declarations, parts, registry
-from sph.config.choices import Choice, ModelChoice, labelled_table, plain
+from sph.config.choices import Choice, LabelledTable, ModelChoice, labelled_table, plain
 from sph.config.restarts import CLASSES, FREE, RECORDED, REFUSED
 from sph.config.toml_text import value_text
 from sph.errors import DeclarationError
@@ -121,7 +121,8 @@ class Physics(Section):
 
     def shown(self, key: str) -> str:
         """Return the value of a key as TOML."""
-        return value_text(getattr(self, key))
+        value = getattr(self, key)
+        return value_text(value.choice() if isinstance(value, LabelledTable) else value)
 
 
 @functools.cache

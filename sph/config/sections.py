@@ -5,7 +5,7 @@ from typing import Annotated, ClassVar, Literal
 
 from pydantic import AfterValidator, Field
 
-from sph.config.restarts import FREE, RECORDED, class_of
+from sph.config.restarts import FREE, RECORDED, REFUSED, class_of
 from sph.problems.base import Section
 
 Count = Annotated[int, Field(ge=1)]
@@ -16,6 +16,13 @@ class Time(Section):
 
     restart: ClassVar[str | None] = "free"
     end: float = Field(gt=0, description="time at which the run ends; every run starts at t = 0")
+    stepping: Literal["global", "individual"] = Field(
+        "global",
+        description='time steps: "global", one step for all particles, or "individual", a step for '
+        "each particle, which is faster where few particles need short steps; total energy and "
+        "momentum are then conserved to the accuracy of the steps, not to round-off",
+        json_schema_extra=REFUSED,  # type: ignore[arg-type]
+    )
 
 
 class Output(Section):

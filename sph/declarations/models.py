@@ -3,10 +3,11 @@
 import inspect
 import types
 from collections.abc import Iterable
-from typing import Any, get_type_hints
+from typing import Any, Literal, get_args, get_origin, get_type_hints
 
 from sph.declarations.messages import wrong
 from sph.errors import DeclarationError
+from sph.model import parameters
 
 
 def only_class(module: types.ModuleType, found: Iterable[type], what: str) -> type:
@@ -31,7 +32,7 @@ def check_model(kind: Any, package: types.ModuleType) -> None:
         if name in reserved or name == "issues":
             raise wrong(kind, f"parameter {name!r}: this name is reserved; rename it")
     for name, default in kind._field_defaults.items():
-        if not isinstance(default, bool | int | float):
+        if not isinstance(default, bool | int | float) and default not in _words(kind, name):
             raise wrong(kind, f"parameter {name!r}: the default is {default!r}, expected a number")
     if missing := [name for name in kind.required() if not hasattr(kind, name)]:
         raise wrong(kind, f"{', '.join(missing)} missing: expected a method or parameter")
@@ -43,3 +44,9 @@ def check_model(kind: Any, package: types.ModuleType) -> None:
         found = list(inspect.signature(method).parameters)
         if found[1:] != expected[1:]:
             raise wrong(kind, f"{name}({', '.join(found)}): expected {name}({', '.join(expected)})")
+
+
+def _words(kind: Any, name: str) -> list[Any]:
+    """Return the values of a Literal that the type of a parameter contains."""
+    hint, _ = parameters(kind)[name]
+    return [word for one in get_args(hint) if get_origin(one) is Literal for word in get_args(one)]

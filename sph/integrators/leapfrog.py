@@ -40,6 +40,38 @@ def correct(state: State, evolved: tuple[Evolved, ...], dt: float, team: Team = 
     return given
 
 
+def predict_each(
+    state: State, evolved: tuple[Evolved, ...], dt: float, since: np.ndarray, own: np.ndarray,
+    team: Team = ALONE,
+) -> float:  # fmt: skip
+    """Advance positions by dt, and set the predicted fields to the present time.
+
+    since (N,): time since the beginning of each particle's step; own (N,): length of the steps that
+    end now, by half of which the evolved fields advance; 0 for other particles. Returns the energy
+    that was added in addition to the rates.
+    """
+    s, n, given = state, state.mass.size, 0.0
+    moved = s.position, s.velocity, s.acceleration, s.predicted_velocity
+    team.chunks(move_each, n, dt, since, own, *moved)
+    for one in evolved:
+        value, rate, predicted = map(s.rows, (one.value, one.rate, one.predicted))
+        arrays = value, rate, s.mass, predicted
+        given += sum(team.chunks(one.rule.predict_each, n, since, own, *arrays))
+    return given
+
+
+def correct_each(
+    state: State, evolved: tuple[Evolved, ...], own: np.ndarray, team: Team = ALONE
+) -> float:
+    """As `correct`, for the steps `own` (N,), which are 0 for particles whose step goes on."""
+    s, n, given = state, state.mass.size, 0.0
+    team.chunks(straight_correct_each, n, own, s.velocity, s.acceleration, s.mass)
+    for one in evolved:
+        value, rate = s.rows(one.value), s.rows(one.rate)
+        given += sum(team.chunks(one.rule.correct_each, n, own, value, rate, s.mass))
+    return given
+
+
 def keep(state: State, evolved: tuple[Evolved, ...]) -> None:
     """Set predicted fields to the initial values."""
     state.predicted_velocity[:] = state.velocity
@@ -145,5 +177,66 @@ def _kept_positive(energy, change):
     return energy + change, 0.0
 
 
-STRAIGHT = Rule(_straight_predict, straight_correct)
-POSITIVE = Rule(_positive_predict, _positive_correct)
+# --- individual time steps ---
+
+
+@njit(**COMPILED)
+def move_each(first, last, dt, since, own, position, velocity, acceleration, velocity_now):
+    """Advance positions by dt, to a time `since` after the beginning of each particle's step.
+
+    velocity_now receives the velocity at that time; `velocity` advances by half of `own`. since,
+    own: (N,).
+    """
+    for d in range(position.shape[0]):
+        for i in range(np.uint64(first), np.uint64(last)):
+            a = acceleration[d, i]
+            v = velocity[d, i]
+            position[d, i] += (v + a * (since[i] - 0.5 * dt)) * dt
+            velocity_now[d, i] = v + a * since[i]
+            velocity[d, i] = v + 0.5 * a * own[i]
+
+
+@njit(**COMPILED)
+def _straight_predict_each(first, last, since, own, value, rate, mass, value_now) -> float:
+    for d in range(value.shape[0]):
+        for i in range(np.uint64(first), np.uint64(last)):
+            start = value[d, i]
+            value_now[d, i] = start + rate[d, i] * since[i]
+            value[d, i] = start + 0.5 * rate[d, i] * own[i]
+    return 0.0
+
+
+@njit(**COMPILED)
+def straight_correct_each(first, last, own, value, rate, mass) -> float:
+    """Advance `value` by the second half of the steps `own` (N,) with the new rates."""
+    for d in range(value.shape[0]):
+        for i in range(np.uint64(first), np.uint64(last)):
+            value[d, i] += 0.5 * rate[d, i] * own[i]
+    return 0.0
+
+
+@njit(**ROUNDED)
+def _positive_predict_each(first, last, since, own, energy, rate, mass, energy_now) -> float:
+    given = 0.0
+    for d in range(energy.shape[0]):
+        for i in range(first, last):
+            energy_now[d, i], _ = _kept_positive(energy[d, i], rate[d, i] * since[i])
+            energy[d, i], extra = _kept_positive(energy[d, i], 0.5 * rate[d, i] * own[i])
+            given += mass[i] * extra
+    return given
+
+
+@njit(**ROUNDED)
+def _positive_correct_each(first, last, own, energy, rate, mass) -> float:
+    given = 0.0
+    for d in range(energy.shape[0]):
+        for i in range(first, last):
+            energy[d, i], extra = _kept_positive(energy[d, i], 0.5 * rate[d, i] * own[i])
+            given += mass[i] * extra
+    return given
+
+
+STRAIGHT = Rule(_straight_predict, straight_correct, _straight_predict_each, straight_correct_each)
+POSITIVE = Rule(
+    _positive_predict, _positive_correct, _positive_predict_each, _positive_correct_each
+)

@@ -167,11 +167,17 @@ def limit(
 def before_contact(limit: StepLimit, bounds: Bounds, particles: State, domain) -> StepLimit:
     """Return `limit`, reduced if particles that are not neighbours yet would meet within it."""
     p = particles
-    part, particle = first_contact(
-        p.position, p.velocity, p.acceleration, p.support, p.id, domain.images,
-        domain.longest_reach, limit.dt, 2.0 / 3.0 * bounds.courant,
-    )  # fmt: skip
+    part, particle = contact(bounds, p, p.velocity, p.acceleration, domain, limit.dt)
     return StepLimit(part * limit.dt, int(particle), "approach") if part < 1.0 else limit
+
+
+def contact(bounds: Bounds, particles: State, velocity, acceleration, domain, dt: float):
+    """Return the fraction of dt in which particles first meet, and an ID; see `first_contact`."""
+    p = particles
+    return first_contact(
+        p.position, velocity, acceleration, p.support, p.id, domain.images, domain.longest_reach,
+        dt, 2.0 / 3.0 * bounds.courant,
+    )  # fmt: skip
 
 
 def _largest(found: list[tuple[float, int]]) -> tuple[float, int]:

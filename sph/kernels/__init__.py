@@ -34,6 +34,15 @@ class Kernel(Protocol):
     def force_over_q(self, dim: Dim, q: Any) -> Any:
         """The value that replaces dw_over_q in the pair force (eqs 22-23); usually equal to it."""
 
+    # The two methods below are for self-gravity in 3-D (eqs 300-301), and for q <= 1 only. A
+    # kernel may lack them: scenes with gravity then refuse the kernel.
+
+    def enclosed_over_q3(self, q: Any) -> Any:
+        """M(q)/q^3, with M the fraction of the kernel's mass within q: 1 at q = 1."""
+
+    def potential_depth(self, q: Any) -> Any:
+        """-phi H/(G m), with phi the potential of a mass m with the kernel's density: 1 at 1."""
+
 
 class Defaults(Model):
     """Defaults of a kernel: attributes that its class need not define."""
@@ -70,6 +79,21 @@ def dw_over_q(self: Kernel, dim: Dim, q: Any) -> Any:
 @verb
 def force_over_q(self: Kernel, dim: Dim, q: Any) -> Any:
     return self.force_over_q(dim, q)
+
+
+@verb
+def enclosed_over_q3(self: Kernel, q: Any) -> Any:
+    return self.enclosed_over_q3(q)
+
+
+@verb
+def potential_depth(self: Kernel, q: Any) -> Any:
+    return self.potential_depth(q)
+
+
+def softens(kernel: Kernel) -> bool:
+    """Return whether a kernel has the methods that self-gravity needs."""
+    return hasattr(kernel, "enclosed_over_q3") and hasattr(kernel, "potential_depth")
 
 
 @functools.lru_cache(64, typed=True)  # typed: kernels of two classes may hold equal parameters

@@ -3,7 +3,9 @@
 import math
 from typing import Annotated, NamedTuple
 
-from sph.compiled import larger
+from numba.extending import register_jitable
+
+from sph.compiled import INLINED, larger, smaller
 from sph.kernels import Defaults
 from sph.model import Parameter, model
 
@@ -47,3 +49,31 @@ class CubicSpline(NamedTuple):
         v = larger(0.5 - clipped, 0.0)
         # dw/dq at the clipped q, over the true q; 1e-30 matters only for coincident particles
         return (-6.0 * u * u / outer - 18.0 * v) * (clipped / larger(q, 1e-30))
+
+    def enclosed_over_q3(self, q):
+        return 16 / 15 * _enclosed(1.0, q) - 1 / 15 * _enclosed(2.0, q)
+
+    def potential_depth(self, q):
+        return 16 / 15 * _depth(1.0, q) - 1 / 15 * _depth(2.0, q)
+
+
+# The spline is a sum of masses with densities proportional to (1 - q/a)_+^3, where a is the
+# position of a knot. The functions below are those of one such mass; `inverse` is 1/a. The mass
+# acts like a point from q = a on.
+
+
+@register_jitable(**INLINED)
+def _enclosed(inverse, q):
+    s = smaller(inverse, 1.0 / larger(q, 1e-30))
+    u = 1.0 - q * s
+    u2 = u * u
+    return s * s * s * (1.0 + 3.0 * u + u2 * (6.0 + 10.0 * u))
+
+
+@register_jitable(**INLINED)
+def _depth(inverse, q):
+    s = smaller(inverse, 1.0 / larger(q, 1e-30))
+    u = 1.0 - q * s
+    u2 = u * u
+    u4 = u2 * u2
+    return s * (1.0 + u + u2 * (1.0 + u) + u4 * (1.0 - 2.0 * u))

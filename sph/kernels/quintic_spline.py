@@ -7,7 +7,9 @@ import math
 from types import MappingProxyType
 from typing import NamedTuple
 
-from sph.compiled import larger
+from numba.extending import register_jitable
+
+from sph.compiled import INLINED, larger, smaller
 from sph.kernels import Defaults
 from sph.model import model
 
@@ -41,3 +43,36 @@ class QuinticSpline(NamedTuple):
         return -5.0 * (a2 * a2 - 6.0 * b2 * b2) / outer + 10.0 * c * (5.0 * c * c - c - 1.0)
 
     force_over_q = dw_over_q
+
+    def enclosed_over_q3(self, q):
+        return (
+            729 / 560 * _enclosed(1.0, q)
+            - 32 / 105 * _enclosed(1.5, q)
+            + 1 / 336 * _enclosed(3.0, q)
+        )
+
+    def potential_depth(self, q):
+        return 729 / 560 * _depth(1.0, q) - 32 / 105 * _depth(1.5, q) + 1 / 336 * _depth(3.0, q)
+
+
+# The spline is a sum of masses with densities proportional to (1 - q/a)_+^5, where a is the
+# position of a knot. The functions below are those of one such mass; `inverse` is 1/a. The mass
+# acts like a point from q = a on.
+
+
+@register_jitable(**INLINED)
+def _enclosed(inverse, q):
+    s = smaller(inverse, 1.0 / larger(q, 1e-30))
+    u = 1.0 - q * s
+    u2 = u * u
+    u4 = u2 * u2
+    return s * s * s * (1.0 + 3.0 * u + u2 * (6.0 + 10.0 * u) + u4 * (15.0 + 21.0 * u))
+
+
+@register_jitable(**INLINED)
+def _depth(inverse, q):
+    s = smaller(inverse, 1.0 / larger(q, 1e-30))
+    u = 1.0 - q * s
+    u2 = u * u
+    u4 = u2 * u2
+    return s * (1.0 + u + u2 * (1.0 + u) + u4 * (1.0 + u + u2 * (1.0 - 3.0 * u)))

@@ -30,3 +30,16 @@ class WendlandC2(NamedTuple):
         return -20.0 * u * u * u  # eq 14: 4 [u^4 - u^3 (1 + 4q)] = -20 q u^3
 
     force_over_q = dw_over_q
+
+    def enclosed_over_q3(self, q):
+        # in powers of 1 - q, of which less cancels than in powers of q
+        u = 1.0 - q
+        u2 = u * u
+        u4 = u2 * u2
+        return 1.0 + 3.0 * u + u2 * (6.0 + 10.0 * u) + u4 * (15.0 - 21.0 * u)
+
+    def potential_depth(self, q):
+        u = 1.0 - q
+        u2 = u * u
+        u4 = u2 * u2
+        return 1.0 + u + u2 * (1.0 + u) + u4 * (1.0 + u + u2 * (-6.0 + 3.0 * u))

@@ -35,3 +35,30 @@ class WendlandC4(NamedTuple):
         return -56 / 3 * u2 * u2 * u * (1.0 + 5.0 * q)
 
     force_over_q = dw_over_q
+
+    def enclosed_over_q3(self, q):
+        # in powers of 1 - q, of which less cancels than in powers of q
+        u = 1.0 - q
+        u2 = u * u
+        u4 = u2 * u2
+        u8 = u4 * u4
+        return (
+            1.0
+            + 3.0 * u
+            + u2 * (6.0 + 10.0 * u)
+            + u4 * (15.0 + 21.0 * u + u2 * (28.0 - 129.0 * u))
+            + u8 * 65.625
+        )
+
+    def potential_depth(self, q):
+        u = 1.0 - q
+        u2 = u * u
+        u4 = u2 * u2
+        u8 = u4 * u4
+        return (
+            1.0
+            + u
+            + u2 * (1.0 + u)
+            + u4 * (1.0 + u + u2 * (1.0 + u))
+            + u8 * (-19.625 + 21.625 * u + u2 * -6.5625)
+        )

@@ -37,3 +37,30 @@ class WendlandC6(NamedTuple):
         return -22.0 * u4 * u2 * u * (1.0 + 7.0 * q + 16.0 * q * q)
 
     force_over_q = dw_over_q
+
+    def enclosed_over_q3(self, q):
+        # in powers of 1 - q, of which less cancels than in powers of q
+        u = 1.0 - q
+        u2 = u * u
+        u4 = u2 * u2
+        u8 = u4 * u4
+        return (
+            1.0
+            + 3.0 * u
+            + u2 * (6.0 + 10.0 * u)
+            + u4 * (15.0 + 21.0 * u + u2 * (28.0 + 36.0 * u))
+            + u8 * (45.0 - 570.625 * u + u2 * (629.0625 - 195.0 * u))
+        )
+
+    def potential_depth(self, q):
+        u = 1.0 - q
+        u2 = u * u
+        u4 = u2 * u2
+        u8 = u4 * u4
+        return (
+            1.0
+            + u
+            + u2 * (1.0 + u)
+            + u4 * (1.0 + u + u2 * (1.0 + u))
+            + u8 * (1.0 + u + u2 * (-61.5625 + 109.0625 * u) + u4 * (-68.671875 + 15.0 * u))
+        )

@@ -24,10 +24,13 @@ COPYING = 0.12
 # Extent of the region of a list in support diameters: a superblock and H around it.
 WIDTH = 1.8
 
+# Number of steps that lists of particles almost at rest are made for. More would gain little.
+MOST_STEPS = 20
+
 # Share of superblocks above which all lists are built again instead of those that asked.
 MANY = 0.3
 
-# A support radius requests lists a quarter wider than itself. After this many requests in a step,
+# A support radius requests lists as wide as itself. After this many requests in a step,
 # the guess was wrong by orders of magnitude (coincident particles), and the width is doubled.
 PATIENCE = 4
 
@@ -79,16 +82,18 @@ def _largest_step(first, last, velocity, support, dt):
     return np.sqrt(largest) * dt
 
 
-def best_skin(step: float, dimension: int) -> float:
+def best_skin(step: float, dimension: int, share: float = 1.0) -> float:
     """Return the skin with the lowest cost per step if particles move `step` supports in a step.
 
     Lists that serve k steps need a skin of GROWTH + 2 (k - 1) step. Each step then costs 1/k of a
-    build, and the number of listed blocks grows as (1 + skin/WIDTH)^D.
+    build, and the number of listed blocks grows as (1 + skin/WIDTH)^D. share: of the particles that
+    a step computes. A superblock is copied if any of its blocks has such a particle.
     """
+    copying = COPYING * min(1.0, lists.SUPERBLOCK * share)
     least, steps = np.inf, 1
-    for k in range(1, 21):
+    for k in range(1, round(MOST_STEPS / share) + 1):
         skin = GROWTH + 2 * (k - 1) * step
-        cost = BUILD_OVER_PASSES / k + COPYING * (1 + skin / WIDTH) ** dimension
+        cost = BUILD_OVER_PASSES / k + copying * (1 + skin / WIDTH) ** dimension
         if not cost < least:  # the costs are convex in k
             break
         least, steps = cost, k
@@ -127,10 +132,13 @@ class Search:
         self.reach_factor = 1.0 + origin.skin - 2.0 * moved
         return not self.reach_factor > grown
 
-    def skin_for(self, velocity: np.ndarray, support: np.ndarray, dt: float) -> float:
-        """Return the skin for lists built now, for velocity (D, N), support (N,) and step dt."""
+    def skin_for(self, velocity: np.ndarray, support: np.ndarray, dt: float, share: float) -> float:
+        """Return the skin for lists built now, for velocity (D, N), support (N,) and step dt.
+
+        share: see `best_skin`.
+        """
         steps = self.team.chunks(_largest_step, support.size, velocity, support, dt)
-        return best_skin(max(steps), velocity.shape[0])
+        return best_skin(max(steps), velocity.shape[0], share)
 
     def guess(self, position: np.ndarray, ratio: float) -> np.ndarray:
         """Supports (N,) to begin with, none so wide that lists cannot serve it."""

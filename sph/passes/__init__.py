@@ -14,6 +14,7 @@ from numba.extending import is_jitted
 
 from sph.neighbours import lists
 from sph.neighbours.lists import SUPERBLOCK
+from sph.neighbours.order import BLOCK
 from sph.part import Pass
 from sph.state import State
 from sph.threads import SMALLEST_RANGE, Team
@@ -30,6 +31,7 @@ class Neighbours(NamedTuple):
     list_support: np.ndarray  # (N,) H when the lists were built
     reach_factor: float
     lanes: tuple  # the arithmetic of pairs, see `sph.simd`
+    active: np.ndarray | None = None  # the particles to compute, see `sph.passes.active`
 
     @property
     def superblocks(self) -> int:
@@ -52,14 +54,26 @@ class Sweep:
         self.wanted = np.empty(blocks)
         self.models = models  # those of the formulation
         self.neighbours: Neighbours | None = None
-        self.dt = 0.0  # of the present step
+        self.dt: float | np.ndarray = 0.0  # of the present step; (N,) with individual steps
         self.is_start = False  # before the first step, where supports are guesses
+
+    def want_all(self, one: Pass) -> None:
+        """Prepare a pass over all particles that are active."""
+        state, active = self.state, self.state.get("active")
+        if active is None:
+            self.wanted.fill(1.0)
+            return
+        if one.widens:
+            np.maximum.reduceat(active, np.arange(0, active.size, BLOCK), out=self.wanted)
+        if one.swaps is not None:  # the pass writes only the values of active particles
+            first, second = one.swaps
+            getattr(state, second)[:] = getattr(state, first)
 
     def make(self, one: Pass) -> None:
         """Run a pass once. If it requests wider lists, `swaps` waits until it has them."""
         arrays = [None if name is None else getattr(self.state, name) for name in one.arrays]
         if not is_jitted(one.function):
-            one.function(*arrays)
+            self._call(one, arrays)
             return
         models = self.models
         # Before the first step supports are guesses and must converge. Only the pass that finds
@@ -70,6 +84,25 @@ class Sweep:
         self.run(one.function, models, *arrays, *extra)
         if one.swaps is not None and not (one.widens and self.wanted.max() > 0.0):
             self.state.swap(*one.swaps)
+
+    def _call(self, one: Pass, arrays: list[np.ndarray | None]) -> None:
+        """Call an uncompiled pass.
+
+        If not all particles are active, it gets copies of the values of those that are.
+        """
+        active = self.state.get("active")
+        if one.takes_sweep:
+            one.function(self, *arrays)
+            return
+        if active is None or active.all():
+            one.function(*arrays)
+            return
+        chosen = np.flatnonzero(active)
+        parts = [None if array is None else array[..., chosen] for array in arrays]
+        one.function(*parts)
+        for array, part in zip(arrays[len(one.reads) :], parts[len(one.reads) :], strict=True):
+            if array is not None:
+                array[..., chosen] = part
 
     def run(self, function, models, *arguments) -> None:
         """Call function(first, last, dim, models, neighbours, *arguments) over superblocks."""

@@ -144,6 +144,7 @@ class Steps:
         s.time = last[driver.TIME]
         s.step += len(taken)
         s.steps_here += len(taken)
+        s.updates_here += len(taken) * s.particles.number
         kinetic, relative, internal, *others = last[driver.KINETIC : driver.RATES + 1]
         momentum = taken[-1, driver.MOMENTUM :].copy()
         s.totals = totals.Totals(kinetic, relative, internal, {}, momentum, *others)

@@ -29,7 +29,8 @@ def suits(scene: Scene) -> bool:
     swaps = {one.swaps for one in scene.passes} - {None, SWAPPED}
     wideners = [one for one in scene.passes[1:] if one.widens]
     in_python = [name for part in scene.all_parts for name in in_python_of(part)]
-    return all(map(is_jitted, functions)) and not (swaps or wideners or in_python)
+    is_compiled = all(map(is_jitted, functions)) and not (swaps or wideners or in_python)
+    return is_compiled and not scene.has_individual_steps
 
 
 def in_python_of(part: Part) -> list[str]:

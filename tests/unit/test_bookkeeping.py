@@ -61,6 +61,7 @@ def simulation():
     made = SimpleNamespace(
         step=20, steps_here=15, time=0.25, limit=StepLimit(0.125, 17, "energy"), totals=TOTALS,
         energy_drift=-0.01, energy_injected=13.0, energy_added=14.0, held_supports=3,
+        individual=None, updates_here=1500,
         volume_ratio=0.97, columns=dict, list_builds=6, clock=Clock(), scene=scene,
         team=SimpleNamespace(threads=2), check_fields=lambda: None, end=lambda: None,
         particles=SimpleNamespace(
@@ -370,12 +371,14 @@ def test_session_silences_numpy_and_notes_too_many_threads(tmp_path, monkeypatch
 
 def test_cost_reports_session_and_total_seconds(simulation):
     history = {"cpu_seconds": np.array([1.0, 8.0]), "wall_seconds": np.array([2.0, 9.0])}
+    history["step"] = np.array([0, 20])
     found = summary.cost(simulation, history)
     assert found["session"].pop("peak_memory_bytes") > 1e6
     assert found == {
         "cpu_seconds": 8.0,
         "wall_seconds": 9.0,
         "threads": 2,
+        "updates": 2000,
         "session": {
             "steps": 15,
             "updates": 1500,

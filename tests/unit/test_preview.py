@@ -121,7 +121,7 @@ def test_preview_of_many_particles_scaled_from_fewer(small_build_limit, monkeypa
         assert figure(scaled, pattern) == pytest.approx(figure(whole, pattern), rel=0.3)
     cost = "a step costs # CPU s"
     # of milliseconds on a shared machine: this is to find a factor of 16 that was left out
-    assert figure(scaled, cost) == pytest.approx(figure(whole, cost), rel=0.8)
+    assert 0.25 < figure(scaled, cost) / figure(whole, cost) < 4.0
 
 
 def test_preview_of_hundred_million_particles_is_fast(small_build_limit):

@@ -91,11 +91,17 @@ interval = 0.008
 [run]
 threads = 1
 """
+# particles of two steps and of one share blocks; the switch takes the step of each particle
+EACH = SHOCKS.replace("[time]\n", '[time]\nstepping = "individual"\n')
+COLLAPSE = CLOUD.replace("[physics]\n", "[physics]\ngravity = { G = 5.0 }\n").replace(
+    "[time]\n", '[time]\nstepping = "individual"\n'
+)
 SCENES = {
     "1-D mirror": TUBE,
     "2-D periodic, switched alpha": SHEAR,
     "2-D mirror, alpha by shocks, switched conductivity": SHOCKS,
     "3-D open": CLOUD,
+    "2-D mirror, individual steps": EACH,
 }
 
 
@@ -308,6 +314,19 @@ def test_restart_to_later_end_is_bit_for_bit(uninterrupted, tmp_path):
     go_on(run.path, f"time.end={config.time.end}", "run.threads=1")
     assert numbers(run) == numbers(uninterrupted.run)
     assert_same_from(0, run, uninterrupted.run)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("stepping", ["global", "individual"])
+def test_restart_with_self_gravity_is_bit_for_bit(tmp_path, stepping):
+    text = COLLAPSE.replace("individual", stepping)
+    whole = start(text, tmp_path / "whole")
+    half = configuration.from_text(text).override(["time.end=0.05", "run.threads=2"])
+    run = RunDirectory.create(tmp_path / "run")
+    runner.run(half, run, Watch())
+    go_on(run.path, "time.end=0.1", "run.threads=1")
+    assert_same_from(0, run, whole)
+    assert state(run.latest())["potential"].max() < 0.0
 
 
 def test_restart_after_stop_between_outputs_is_bit_for_bit(uninterrupted, tmp_path):
@@ -802,6 +821,18 @@ def test_energy_limit_applies_from_first_step_of_restart(tmp_path):
     assert then - first == pytest.approx(allowed, rel=1e-9)
 
 
+def test_changed_limits_apply_to_individual_steps_of_restart(tmp_path):
+    free = EACH.replace("[physics]\n", "[physics]\nenergy_limit = false\n")
+    run = start(free.replace("end = 0.032", "end = 0.008"), tmp_path / "run")
+    last = checkpoints.read(run.latest())
+    before, p = last.particles.time_step.copy(), last.particles
+    allowed = 0.015 * p.internal_energy / np.abs(p.energy_rate)
+    assert (allowed < 0.4 * before).any()  # else this shows nothing
+    changed = last.config.override(["physics.C=0.015", "physics.energy_limit=true"])
+    assert restarting._coming_step(changed, last) == pytest.approx(0.5 * last.next_step)
+    np.testing.assert_allclose(p.time_step, np.minimum(0.5 * before, allowed))
+
+
 def test_energy_limit_of_restart_ignores_gas_without_energy(tmp_path):
     """Cooling may take u to 0 by rounding. Such a particle sets no step, here as in any step."""
     run = start(TUBE.replace("end = 0.2", "end = 0.05") + "[physics]\nenergy_limit = false\n",
@@ -883,7 +914,9 @@ def test_summary_matches_run(uninterrupted):
     assert kept["energy_drift_max"] == pytest.approx(np.abs(drift).max(), abs=3e-16)
     session = cost["session"]
     assert session["steps"] == summary["steps"]
-    assert session["updates"] == summary["steps"] * summary["particles"]
+    updates = [float(row["updates"]) for row in rows(run) if "updates" in row]
+    expected = sum(updates) if updates else summary["steps"] * summary["particles"]
+    assert session["updates"] == summary["cost"]["updates"] == expected
     assert session["peak_memory_bytes"] > 50e6  # Python with NumPy alone takes more
     assert any(config.physics.scheme in part for part in summary["compiled_in"])
     switched = not isinstance(config.physics.alpha, float)

@@ -147,6 +147,7 @@ PARTS = {
     "Balsara factor": ["physics.balsara=true"],
     "divergence of velocity": [RANGE],
     "curl of velocity": ["physics.balsara=true"],
+    "individual time steps": ["time.stepping=individual"],
     "time step limit u/|du/dt|": ["physics.energy_limit=true"],
 }
 NOTHING = [STILL, "physics.energy_limit=false"]

@@ -245,7 +245,7 @@ def test_unphysical_particle_is_named(begin, name, value):
     simulation.advance(math.inf)  # what a run begins with cannot be helped by smaller steps
     getattr(simulation.particles, name)[..., 7] = value
     with pytest.raises(NumericalError) as caught:
-        simulation._measure(past=None)
+        simulation.measure()
     words = name.replace("_", " ")
     assert f"{words} of particle {simulation.particles.id[7]} at (" in str(caught.value)
     assert f"{value}" in str(caught.value)

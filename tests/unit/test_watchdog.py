@@ -71,7 +71,7 @@ def test_unphysical_value_names_particle(begin, name, value, words):
     simulation = begin("physics.energy_limit=false")
     getattr(simulation.particles, name)[..., 7] = value
     with pytest.raises(NumericalError, match=f"{words} of particle") as caught:
-        simulation._measure(past=None)
+        simulation.measure()
     assert caught.value.particle == simulation.particles.id[7]
 
 
@@ -490,7 +490,7 @@ def test_energy_drift_in_external_field_suggests_softening(begin, pulled):
     simulation = begin(*field, text=CLOUD)
     simulation.particles.internal_energy *= 2.0
     with pytest.raises(NumericalError, match="energy has drifted") as caught:
-        simulation._measure(past=None)
+        simulation.measure()
     assert ("softening" in str(caught.value)) == pulled
 
 
@@ -505,7 +505,7 @@ def test_overflowing_sum_distinguished_from_tiny_step(begin, key, words):
         np.errstate(all="ignore"),
         pytest.raises(NumericalError, match=f"total {words} energy is not"),
     ):
-        simulation._measure(past=None)
+        simulation.measure()
 
 
 def test_run_far_too_slow_to_finish_stops(begin, monkeypatch):

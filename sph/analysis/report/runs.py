@@ -210,7 +210,8 @@ def _cost(summary: Summary) -> dict[str, float]:
     return {
         "cpu": summary["cost"]["cpu_seconds"],
         "wall": wall_without_start(summary["cost"]),
-        "updates": summary["particles"] * summary["steps"],
+        # summaries of earlier versions have none
+        "updates": summary["cost"].get("updates", summary["particles"] * summary["steps"]),
         "n": summary["particles"],
     }
 

@@ -10,6 +10,7 @@ from sph.formulations import Formulation
 from sph.formulations.gas.density import density
 from sph.formulations.gas.rates import rates
 from sph.formulations.gas.smoothing import Smoothing
+from sph.formulations.gas.thermodynamics import predict
 from sph.formulations.gas.weighting import ByMass, ByNumber
 from sph.integrators.leapfrog import POSITIVE
 from sph.part import Evolved, Key, Pass
@@ -77,6 +78,7 @@ class Gas(Formulation):
         physics = scene.physics
         terms = {role: model for part in scene.parts for role, model in part.terms.items()}
         needs = {name for part in scene.parts for name in part.needs}
+        needs |= {"div_v"} if scene.has_individual_steps else set()  # predicts densities
         self.scheme = registry.model(SCHEMES, physics.scheme)
         self.dimension = scene.dimension
         self.density_passes = physics.density_passes
@@ -141,7 +143,18 @@ class Gas(Formulation):
         gas = ("position", "predicted_velocity", "mass", "predicted_energy", "support")
         exchanged = "predicted_energy" if self.exchanges else None
         alpha = "predicted_alpha" if "predicted_alpha" in declared else "alpha"
+        prediction = Pass(
+            "prediction",
+            "density",
+            predict,
+            ("predicted_energy", "support", "density", "omega", *of("div_v", "curl_v")),
+            of("pressure", "pressure_term", "sound_speed", "balsara"),
+            at_start=False,
+        )
+        # a pressure that is a sum over neighbours cannot be predicted for one particle
+        is_predicted = scene.has_individual_steps and not self.scheme.sums_pressure
         return (
+            *[prediction] * is_predicted,
             # steps 2-4 and 6: density, support, Omega, div v, curl v, EOS and rate of alpha
             Pass(
                 "density",

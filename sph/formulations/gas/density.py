@@ -13,6 +13,7 @@ from sph.formulations.gas.thermodynamics import summed, thermodynamics
 from sph.formulations.gas.weighting import copy_weights, mass_per_weight, weight
 from sph.kernels import dw_over_q, normalisation, w
 from sph.neighbours.order import BLOCK
+from sph.passes.active import is_active
 from sph.passes.gather import (
     FAR,
     TINY,
@@ -122,11 +123,13 @@ def density(
             i_first, i_last = block * BLOCK, min((block + 1) * BLOCK, mass.size)
             number = 0
             for i in range(i_first, i_last):
-                members[number] = i
-                number += 1
+                if is_active(neighbours.active, i):
+                    members[number] = i
+                    number += 1
             for attempt in range(2):
                 farthest = 0.0
-                for i in range(i_first, i_last):
+                for index in range(number):
+                    i = members[index]
                     farthest = max(farthest, _reach(attempt, support_before, neighbours, i))
                 farthest *= per_length
                 blocks = near_blocks(lanes, dim, boxes, listed, low, high, farthest, chosen)
@@ -189,6 +192,7 @@ def density(
             thermodynamics(
                 lanes, models, block, energy, support, rho, Omega, div_v, curl_v, alpha,
                 energy_shift, pressure, pressure_term, sound_speed, balsara, alpha_rate,
+                neighbours.active,
             )  # fmt: skip
 
 

@@ -11,6 +11,7 @@ from sph.formulations.gas.terms import exchange_speed, pair_alpha
 from sph.formulations.gas.weighting import by_share
 from sph.kernels import force_over_q, normalisation
 from sph.neighbours.order import BLOCK
+from sph.passes.active import any_active, is_active
 from sph.passes.gather import (
     TINY,
     also,
@@ -87,6 +88,8 @@ def rates(
     for superblock in range(first, last):
         begin, end = lists.first[superblock], lists.first[superblock + 1]
         i_0, i_end = begin * BLOCK, min(end * BLOCK, mass.size)
+        if not any_active(neighbours.active, i_0, i_end):
+            continue
         x_0, v_0 = middle(dim, neighbours, begin, end), at(dim, velocity, i_0)
         per_length = unit(largest_of(support, i_0, i_end))
         per_velocity = unit(largest_of(sound_speed, i_0, i_end))
@@ -126,6 +129,8 @@ def rates(
         for block in range(begin, end):
             low, high = own_box(dim, neighbours, block, x_0, per_length)
             i_first, i_last = block * BLOCK, min((block + 1) * BLOCK, mass.size)
+            if not any_active(neighbours.active, i_first, i_last):
+                continue
             reach = largest_of(support, i_first, i_last) * per_length
             blocks = near_blocks(lanes, dim, boxes, number, low, high, reach, chosen)
             nc = near_particles(
@@ -133,6 +138,8 @@ def rates(
             )
             store(near, (rest + M_HALF, nc), filled(lanes, 1.0))  # a weighting divides by masses
             for i in range(i_first, i_last):
+                if not is_active(neighbours.active, i):
+                    continue
                 x_i = times(minus(at(dim, position, i), x_0), per_length)
                 v_i = times(minus(at(dim, velocity, i), v_0), per_velocity)
                 rho_i, c_i = density[i] * per_density, sound_speed[i] * per_velocity

@@ -6,26 +6,45 @@ their results. Arrays are (N,).
 
 from numba import njit
 
-from sph.compiled import INLINED
+from sph.compiled import COMPILED, INLINED
 from sph.eos import pressure as pressure_of
 from sph.eos import sound_speed as sound_speed_of
 from sph.formulations.gas.schemes import summed_terms
 from sph.formulations.gas.terms import alpha_rate as alpha_rate_of
 from sph.formulations.gas.terms import balsara_factor
 from sph.neighbours.order import BLOCK
+from sph.passes.active import where_active
 from sph.passes.gather import read, write
 from sph.simd import block_width
+
+
+@njit(**COMPILED)
+def predict(
+    first, last, dim, models, neighbours, energy, support, rho, Omega, div_v, curl_v, pressure,
+    pressure_term, sound_speed, balsara,
+):  # fmt: skip
+    """With individual steps, do so for superblocks [first, last) from predicted values.
+
+    Active particles receive final values in the density pass.
+    """
+    lists = neighbours.lists
+    for block in range(lists.first[first], lists.first[last]):
+        thermodynamics(
+            neighbours.lanes, models, block, energy, support, rho, Omega, div_v, curl_v, None,
+            None, pressure, pressure_term, sound_speed, balsara, None, None,
+        )  # fmt: skip
 
 
 @njit(**INLINED)
 def thermodynamics(
     lanes, models, block, energy, support, rho, Omega, div_v, curl_v, alpha, energy_shift, pressure,
-    pressure_term, sound_speed, balsara, alpha_rate,
+    pressure_term, sound_speed, balsara, alpha_rate, active,
 ):  # fmt: skip
     """Set sound speed, pressure, P/(Omega rho^2), Balsara factor and rate of alpha of a block.
 
     That is, those of them that the scene has: an array may be None. A scheme that sums its pressure
-    (energy_shift is not None) sets pressure and P/(Omega rho^2) itself, by `summed`.
+    (energy_shift is not None) sets pressure and P/(Omega rho^2) itself, by `summed`. The rate of
+    alpha is that of active particles only.
     """
     for lane in range(0, BLOCK, block_width(lanes)):
         rho_i = read(lanes, rho, block, lane, 1.0)
@@ -49,6 +68,7 @@ def thermodynamics(
                 alpha_i = read(lanes, alpha, block, lane, 0.0)
                 h = H / models.support_ratio
                 rate = alpha_rate_of(models.viscosity, alpha_i, h, c, div)
+                rate = where_active(active, lanes, alpha_rate, block, lane, rate)
                 write(alpha_rate, block, lane, rate)
 
 

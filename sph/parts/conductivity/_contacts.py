@@ -9,6 +9,7 @@ from numba import njit
 from sph.compiled import COMPILED, INLINED, larger, smaller
 from sph.kernels import dw_over_q, normalisation
 from sph.neighbours.order import BLOCK
+from sph.passes.active import any_active, is_active
 from sph.passes.gather import (
     TINY,
     copy_box,
@@ -80,6 +81,8 @@ def contacts(
     for superblock in range(first, last):
         begin, end = lists.first[superblock], lists.first[superblock + 1]
         i_0, i_end = begin * BLOCK, min(end * BLOCK, mass.size)
+        if not any_active(neighbours.active, i_0, i_end):
+            continue
         x_0, v_0 = at(dim, position, i_0), at(dim, velocity, i_0)
         per_length = unit(largest_of(support, i_0, i_end))
         per_velocity = unit(largest_of(sound_speed, i_0, i_end))
@@ -112,12 +115,16 @@ def contacts(
         for block in range(begin, end):
             low, high = own_box(dim, neighbours, block, x_0, per_length)
             i_first, i_last = block * BLOCK, min((block + 1) * BLOCK, mass.size)
+            if not any_active(neighbours.active, i_first, i_last):
+                continue
             reach = largest_of(support, i_first, i_last) * per_length
             blocks = near_blocks(lanes, dim, boxes, number, low, high, reach, chosen)
             nc = near_particles(
                 lanes, dim, copied, fields, 0, chosen, blocks, low, high, reach, near
             )
             for i in range(i_first, i_last):
+                if not is_active(neighbours.active, i):
+                    continue
                 x_i = times(minus(at(dim, position, i), x_0), per_length)
                 v_i = times(minus(at(dim, velocity, i), v_0), per_velocity)
                 H_inv = 1.0 / (support[i] * per_length)

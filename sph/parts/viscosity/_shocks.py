@@ -16,6 +16,7 @@ from sph.compiled import COMPILED, INLINED, larger, smaller, verb
 from sph.formulations.gas.weighting import copy_weights, mass_per_weight, weight
 from sph.kernels import dw_over_q, normalisation, w
 from sph.neighbours.order import BLOCK
+from sph.passes.active import any_active, is_active, step_of
 from sph.passes.gather import (
     TINY,
     copy_box,
@@ -106,6 +107,8 @@ def shocks(
 ):  # fmt: skip
     """Advance alpha (N,) by the step dt, in place, over superblocks [first, last).
 
+    dt: one step, or (N,) with individual steps.
+
     `velocity` is the predicted velocity; `div_v` (N,) comes from the density pass, `acceleration`
     (D, N) from the last step.
     """
@@ -124,6 +127,8 @@ def shocks(
     for superblock in range(first, last):
         begin, end = lists.first[superblock], lists.first[superblock + 1]
         i_0, i_end = begin * BLOCK, min(end * BLOCK, mass.size)
+        if not any_active(neighbours.active, i_0, i_end):
+            continue
         x_0, v_0, a_0 = (
             at(dim, position, i_0), at(dim, velocity, i_0), at(dim, acceleration, i_0)
         )  # fmt: skip
@@ -162,12 +167,16 @@ def shocks(
         for block in range(begin, end):
             low, high = own_box(dim, neighbours, block, x_0, per_length)
             i_first, i_last = block * BLOCK, min((block + 1) * BLOCK, mass.size)
+            if not any_active(neighbours.active, i_first, i_last):
+                continue
             reach = largest_of(support, i_first, i_last) * per_length
             blocks = near_blocks(lanes, dim, boxes, number, low, high, reach, chosen)
             nc = near_particles(
                 lanes, dim, copied, fields, 0, chosen, blocks, low, high, reach, near
             )
             for i in range(i_first, i_last):
+                if not is_active(neighbours.active, i):
+                    continue
                 x_i = times(minus(at(dim, position, i), x_0), per_length)
                 v_i = times(minus(at(dim, velocity, i), v_0), per_velocity)
                 a_i = times(minus(at(dim, acceleration, i), a_0), per_acceleration)
@@ -229,8 +238,9 @@ def shocks(
                         shear += strain * strain
                 rates = per_rate * per_rate
                 alpha[i] = alpha_after(
-                    viscosity, alpha[i], dt, support[i], lane_max(fastest) / per_velocity,
-                    divergence / per_rate, divergence_rate / rates, shear / rates, sign,
+                    viscosity, alpha[i], step_of(dt, i), support[i],
+                    lane_max(fastest) / per_velocity, divergence / per_rate,
+                    divergence_rate / rates, shear / rates, sign,
                 )  # fmt: skip
 
 

@@ -1,0 +1,114 @@
+"""Limit on the time steps of neighbours, with individual steps.
+
+By Saitoh & Makino (2009), ApJ 697, L99: no particle may have a step more than RATIO times that of a
+neighbour. Otherwise fast gas could reach a particle with a long step, and pass it, before the
+particle feels any force.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+
+from sph.compiled import COMPILED, INLINED
+from sph.neighbours.order import BLOCK
+from sph.passes.gather import unpacked
+
+RATIO = 4.0
+
+
+class Blocks(NamedTuple):
+    """Extremes of the steps and supports of each block, (blocks,) each."""
+
+    shortest: np.ndarray  # step of all particles
+    longest: np.ndarray
+    shortest_active: np.ndarray  # step of active particles; inf without any
+    longest_active: np.ndarray  # 0 without any
+    widest: np.ndarray  # support
+
+    @classmethod
+    def empty(cls, number: int) -> "Blocks":
+        return cls(*(np.empty(number) for _ in cls._fields))
+
+
+@njit(**COMPILED)
+def survey(first, last, length, support, active, blocks):
+    """Set the entries [first, last) of `blocks` from length, support and active, (N,)."""
+    for block in range(first, last):
+        shortest, longest, widest = np.inf, 0.0, 0.0
+        shortest_active, longest_active = np.inf, 0.0
+        for i in range(block * BLOCK, min((block + 1) * BLOCK, length.size)):
+            shortest, longest = min(shortest, length[i]), max(longest, length[i])
+            widest = max(widest, support[i])
+            if active[i] > 0.0:
+                shortest_active = min(shortest_active, length[i])
+                longest_active = max(longest_active, length[i])
+        blocks.shortest[block], blocks.longest[block] = shortest, longest
+        blocks.shortest_active[block], blocks.longest_active[block] = (
+            shortest_active, longest_active
+        )  # fmt: skip
+        blocks.widest[block] = widest
+
+
+@njit(**COMPILED)
+def limit(first, last, dim, models, neighbours, position, support, length, blocks, allowed):
+    """Write to allowed (N,) RATIO times the shortest step of any neighbour, inf if none is shorter.
+
+    For superblocks [first, last). length (N,): the steps; blocks: see `survey`. Neighbours are
+    particles within the larger of both support radii. A pair without an active particle was
+    considered when the last of both was active, and is left out.
+    """
+    lists = neighbours.lists
+    for superblock in range(first, last):
+        begin, end = lists.first[superblock], lists.first[superblock + 1]
+        most = most_active = 0.0
+        for own in range(begin, end):
+            most = max(most, blocks.longest[own])
+            most_active = max(most_active, blocks.longest_active[own])
+        for i in range(begin * BLOCK, min(end * BLOCK, length.size)):
+            allowed[i] = np.inf
+        for t in range(lists.count[superblock]):
+            block, image = unpacked(lists.entries[lists.start[superblock] + t])
+            least = RATIO * blocks.shortest[block]
+            least_active = RATIO * blocks.shortest_active[block]
+            if not (least_active < most or least < most_active):
+                continue
+            for own in range(begin, end):
+                if not (least_active < blocks.longest[own] or least < blocks.longest_active[own]):
+                    continue
+                reach = max(blocks.widest[own], blocks.widest[block])
+                if _squared_gap(dim, neighbours, own, block, image) < reach * reach:
+                    _limit_block(
+                        dim, neighbours, position, support, length, own, block, image, allowed
+                    )
+
+
+@njit(**INLINED)
+def _squared_gap(dim, neighbours, own, block, image):
+    """Return the squared distance between the box of a block and an image of that of another."""
+    D, boxes = len(dim), neighbours.boxes
+    sign, offset = neighbours.images
+    squared = 0.0
+    for d in range(D):
+        s, o = sign[image, d], offset[image, d]
+        a, b = s * boxes[block, d] + o, s * boxes[block, D + d] + o
+        gap = max(0.0, max(min(a, b) - boxes[own, D + d], boxes[own, d] - max(a, b)))
+        squared += gap * gap
+    return squared
+
+
+@njit(**INLINED)
+def _limit_block(dim, neighbours, position, support, length, own, block, image, allowed):
+    """Limit the particles of the block `own` by an image of another block."""
+    sign, offset = neighbours.images
+    for i in range(own * BLOCK, min((own + 1) * BLOCK, length.size)):
+        for j in range(block * BLOCK, min((block + 1) * BLOCK, length.size)):
+            if not RATIO * length[j] < min(length[i], allowed[i]):
+                continue
+            squared = 0.0
+            for d in range(len(dim)):
+                r = position[d, i] - (sign[image, d] * position[d, j] + offset[image, d])
+                squared += r * r
+            H = max(support[i], support[j])
+            if squared < H * H:
+                allowed[i] = RATIO * length[j]

@@ -1,0 +1,161 @@
+"""The nodes of the block tree with their moments, and the walk that sorts nodes into far and near.
+
+Nodes have the indices and blocks of `sph.neighbours.tree`. Moments are computed anew in each step,
+from the present positions, so nothing is kept between steps.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+
+from sph.arrays import empty
+from sph.compiled import COMPILED, INLINED
+from sph.neighbours.order import BLOCK, number_of_blocks
+from sph.threads import Team
+
+# Columns of `values`. The quadrupole about the centre of mass is Q_ab = sum m (3 d_a d_b - d^2
+# delta_ab), its components in the order xx, xy, xz, yy, yz; it has no trace.
+CENTRE, MASS, Q, RADIUS, SUPPORT, LOW, HIGH, COLUMNS = 0, 3, 4, 9, 10, 11, 14, 17
+
+
+class Nodes(NamedTuple):
+    """Nodes by heap index: node k has children 2k + 1 and 2k + 2; unused nodes have first = -1."""
+
+    first: np.ndarray  # (nodes,) first block
+    last: np.ndarray  # (nodes,) one past the last block
+    values: np.ndarray  # (nodes, COLUMNS)
+
+
+def build(position: np.ndarray, mass: np.ndarray, support: np.ndarray, team: Team) -> Nodes:
+    """Return the nodes of particles in block order: position (3, N), mass and support (N,)."""
+    blocks = number_of_blocks(mass.size)
+    size = (2 << (blocks - 1).bit_length()) - 1
+    nodes = Nodes(np.full(size, -1), np.full(size, -1), np.empty((size, COLUMNS)))
+    leaf = np.empty(blocks, np.int64)
+    _split(blocks, nodes.first, nodes.last, leaf)
+    team.run(_sum_particles, blocks, leaf, position, mass, support, nodes.values)
+    _sum_nodes(nodes.first, nodes.last, nodes.values)
+    return nodes
+
+
+@njit(**COMPILED)
+def _split(blocks, first, last, leaf):
+    """Set the blocks of each node, and the node of each block, as `sph.neighbours.tree` does."""
+    first[0], last[0] = 0, blocks
+    for k in range(first.size):
+        if first[k] < 0:
+            continue
+        if last[k] - first[k] == 1:
+            leaf[first[k]] = k
+            continue
+        middle = (first[k] + last[k]) // 2
+        first[2 * k + 1], last[2 * k + 1] = first[k], middle
+        first[2 * k + 2], last[2 * k + 2] = middle, last[k]
+
+
+@njit(**INLINED)
+def _add_quadrupole(values, k, m, x, y, z):
+    """Add the quadrupole of a mass at (x, y, z) from the centre of node k."""
+    third = (x * x + y * y + z * z) / 3.0
+    values[k, Q] += 3.0 * m * (x * x - third)
+    values[k, Q + 1] += 3.0 * m * (x * y)
+    values[k, Q + 2] += 3.0 * m * (x * z)
+    values[k, Q + 3] += 3.0 * m * (y * y - third)
+    values[k, Q + 4] += 3.0 * m * (y * z)
+
+
+@njit(**COMPILED)
+def _sum_particles(first, last, leaf, position, mass, support, values):
+    """Set the values of the nodes that are blocks [first, last)."""
+    for block in range(first, last):
+        k = leaf[block]
+        a, b = block * BLOCK, min((block + 1) * BLOCK, mass.size)
+        for column in range(COLUMNS):
+            values[k, column] = 0.0
+        for p in range(a, b):
+            values[k, MASS] += mass[p]
+            values[k, SUPPORT] = max(values[k, SUPPORT], support[p])
+        for d in range(3):
+            total, low, high = 0.0, position[d, a], position[d, a]
+            for p in range(a, b):
+                total += mass[p] * (position[d, p] - position[d, a])
+                low, high = min(low, position[d, p]), max(high, position[d, p])
+            values[k, CENTRE + d] = position[d, a] + total / values[k, MASS]
+            values[k, LOW + d], values[k, HIGH + d] = low, high
+        farthest = 0.0
+        for p in range(a, b):
+            x = position[0, p] - values[k, CENTRE]
+            y = position[1, p] - values[k, CENTRE + 1]
+            z = position[2, p] - values[k, CENTRE + 2]
+            farthest = max(farthest, x * x + y * y + z * z)
+            _add_quadrupole(values, k, mass[p], x, y, z)
+        values[k, RADIUS] = np.sqrt(farthest)
+
+
+@njit(**COMPILED)
+def _sum_nodes(first, last, values):
+    """Set the values of the nodes that have children, from those of the children."""
+    for k in range(first.size - 1, -1, -1):
+        if first[k] < 0 or last[k] - first[k] == 1:
+            continue
+        a, b = 2 * k + 1, 2 * k + 2
+        part = values[b, MASS] / (values[a, MASS] + values[b, MASS])
+        values[k, MASS] = values[a, MASS] + values[b, MASS]
+        values[k, SUPPORT] = max(values[a, SUPPORT], values[b, SUPPORT])
+        corner = 0.0
+        for d in range(3):
+            low = min(values[a, LOW + d], values[b, LOW + d])
+            high = max(values[a, HIGH + d], values[b, HIGH + d])
+            centre = values[a, CENTRE + d]
+            centre += part * (values[b, CENTRE + d] - centre)
+            values[k, LOW + d], values[k, HIGH + d], values[k, CENTRE + d] = low, high, centre
+            corner += max(centre - low, high - centre) ** 2
+        for component in range(Q, Q + 5):
+            values[k, component] = values[a, component] + values[b, component]
+        farthest = 0.0
+        for child in (a, b):
+            x = values[child, CENTRE] - values[k, CENTRE]
+            y = values[child, CENTRE + 1] - values[k, CENTRE + 1]
+            z = values[child, CENTRE + 2] - values[k, CENTRE + 2]
+            _add_quadrupole(values, k, values[child, MASS], x, y, z)
+            apart = np.sqrt(x * x + y * y + z * z)
+            farthest = max(farthest, apart + values[child, RADIUS])
+        # no particle is farther away than the farthest corner of the box
+        values[k, RADIUS] = min(farthest, np.sqrt(corner))
+
+
+@njit(**INLINED)
+def walk(nodes, box, reach, opening_angle, far, near):
+    """Write nodes that act as a whole on a group to `far`, and blocks of the others to `near`.
+
+    Returns (length of far, length of near). box (6,): lower and upper corner of the group; reach:
+    its largest support. A node acts as a whole if its radius is below opening_angle times the
+    distance of its centre from the box, and if no particle of the node and none of the group can be
+    within a support of the other.
+    """
+    first, last, values = nodes
+    stack = empty(128, np.int64)
+    stack[0] = 0
+    depth, n_far, n_near = 1, 0, 0
+    while depth > 0:
+        depth -= 1
+        k = stack[depth]
+        to_centre = to_box = 0.0
+        for d in range(3):
+            low, high = box[d], box[3 + d]
+            x = values[k, CENTRE + d]
+            to_centre += max(0.0, low - x, x - high) ** 2
+            to_box += max(0.0, low - values[k, HIGH + d], values[k, LOW + d] - high) ** 2
+        H = max(reach, values[k, SUPPORT])
+        if values[k, RADIUS] ** 2 < opening_angle * opening_angle * to_centre and to_box >= H * H:
+            far[n_far] = k
+            n_far += 1
+        elif last[k] - first[k] == 1:
+            near[n_near] = first[k]
+            n_near += 1
+        else:
+            stack[depth] = 2 * k + 2
+            stack[depth + 1] = 2 * k + 1
+            depth += 2
+    return n_far, n_near
