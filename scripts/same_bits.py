@@ -39,6 +39,7 @@ SMALL = {
     "noh_3d": ["problem.n=6000"],
     "point_explosion": ["problem.n=4096"],
     "point_explosion_2d": ["problem.n=4096"],
+    "polytrope": ["problem.n=1000"],
     "rayleigh_taylor": ["problem.n=2048"],
     "sod_3d": ["problem.n=6000"],
     "sound_wave_2d": ["problem.n=1024"],
