@@ -93,6 +93,9 @@ threads = 1
 """
 # particles of two steps and of one share blocks; the switch takes the step of each particle
 EACH = SHOCKS.replace("[time]\n", '[time]\nstepping = "individual"\n')
+COLLAPSE = CLOUD.replace("[physics]\n", "[physics]\ngravity = { G = 5.0 }\n").replace(
+    "[time]\n", '[time]\nstepping = "individual"\n'
+)
 SCENES = {
     "1-D mirror": TUBE,
     "2-D periodic, switched alpha": SHEAR,
@@ -311,6 +314,19 @@ def test_restart_to_later_end_is_bit_for_bit(uninterrupted, tmp_path):
     go_on(run.path, f"time.end={config.time.end}", "run.threads=1")
     assert numbers(run) == numbers(uninterrupted.run)
     assert_same_from(0, run, uninterrupted.run)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("stepping", ["global", "individual"])
+def test_restart_with_self_gravity_is_bit_for_bit(tmp_path, stepping):
+    text = COLLAPSE.replace("individual", stepping)
+    whole = start(text, tmp_path / "whole")
+    half = configuration.from_text(text).override(["time.end=0.05", "run.threads=2"])
+    run = RunDirectory.create(tmp_path / "run")
+    runner.run(half, run, Watch())
+    go_on(run.path, "time.end=0.1", "run.threads=1")
+    assert_same_from(0, run, whole)
+    assert state(run.latest())["potential"].max() < 0.0
 
 
 def test_restart_after_stop_between_outputs_is_bit_for_bit(uninterrupted, tmp_path):
