@@ -51,6 +51,18 @@ def part_issues(found: dict[str, Section]) -> list[Issue]:
     return issues
 
 
+def under_physics(found: dict[str, Section]) -> list[Issue]:
+    """Let the problem take what it needs from [physics]; return an issue if that is missing."""
+    if not {"problem", "physics"} <= found.keys():
+        return []
+    try:
+        found["problem"] = found["problem"].under(found["physics"])
+    except ValueError as error:
+        key, _, text = str(error).partition(" ")
+        return [Issue(("physics", key.removeprefix("physics.")), text)]
+    return []
+
+
 def pairing_issues(found: dict[str, Section]) -> list[Issue]:
     """Return an issue if particles pair with this kernel at this eta, unless pairing is allowed."""
     if not {"problem", "physics"} <= found.keys() or found["physics"].allow_pairing:

@@ -169,6 +169,7 @@ def resolve(
             issues.append(Issue((name,), text))
     issues += checks.gas_issues(found)
     issues += checks.part_issues(found)
+    issues += checks.under_physics(found)
     if not recorded:
         issues += checks.pairing_issues(found)
     issues += checks.output_issues(found)

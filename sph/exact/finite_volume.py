@@ -55,6 +55,7 @@ def _evolve(faces, state, gamma, time, wall_low, wall_high):
     """Advance faces (n + 1) and state (3, n), which is density, velocity and pressure, in place."""
     n = state.shape[1]
     mass = (faces[1:] - faces[:-1]) * state[0]
+    change, rate = np.empty((3, n)), np.empty((3, n))
     lower, upper = np.empty((3, n)), np.empty((3, n))  # states on both faces of each cell
     speed, push = np.empty(n + 1), np.empty(n + 1)  # velocity and pressure of each face
     while time > 0.0:
@@ -63,8 +64,14 @@ def _evolve(faces, state, gamma, time, wall_low, wall_high):
             c = np.sqrt(gamma * state[2, i] / state[0, i])
             dt = min(dt, COURANT * (faces[i + 1] - faces[i]) / c)
         time = time - dt if dt < time else 0.0
-        _reconstruct(faces, state, gamma, dt, wall_low, wall_high, lower, upper)
-        _solve_faces(lower, upper, gamma, wall_low, wall_high, speed, push)
+        limit_changes(state, wall_low, wall_high, change)
+        for i in range(n):
+            width = faces[i + 1] - faces[i]
+            rate[0, i] = -state[0, i] * change[1, i] / width
+            rate[1, i] = -change[2, i] / (state[0, i] * width)
+            rate[2, i] = -gamma * state[2, i] * change[1, i] / width
+        reconstruct(state, change, rate, 0.5 * dt, lower, upper)
+        solve_faces(lower, upper, gamma, wall_low, wall_high, speed, push)
         for i in range(n + 1):
             faces[i] += dt * speed[i]
         for i in range(n):
@@ -98,31 +105,37 @@ def _neighbour(state, k, i, wall_low, wall_high):
 
 
 @njit(**COMPILED)
-def _reconstruct(faces, state, gamma, dt, wall_low, wall_high, lower, upper):
-    """Set the states at cell faces after half a step (Toro eqs 14.42-14.43, Lagrangian)."""
-    change = np.empty(3)
-    for i in range(state.shape[1]):
-        density, velocity, pressure = state[0, i], state[1, i], state[2, i]
-        for k in range(3):
+def limit_changes(state, wall_low, wall_high, change):
+    """Set the limited changes (3, n) of density, velocity and pressure across each cell."""
+    for k in range(3):
+        for i in range(state.shape[1]):
             below = state[k, i] - _neighbour(state, k, i - 1, wall_low, wall_high)
             above = _neighbour(state, k, i + 1, wall_low, wall_high) - state[k, i]
-            change[k] = _limited(below, above)
-        half = 0.5 * dt / (faces[i + 1] - faces[i])
-        density -= half * state[0, i] * change[1]
-        velocity -= half * change[2] / state[0, i]
-        pressure -= half * gamma * state[2, i] * change[1]
-        # first order where expansion would empty the cell within half a step
-        if density <= 0.5 * abs(change[0]) or pressure <= 0.5 * abs(change[2]):
-            density, velocity, pressure = state[0, i], state[1, i], state[2, i]
-            change[:] = 0.0
-        middle = (density, velocity, pressure)
-        for k in range(3):
-            lower[k, i] = middle[k] - 0.5 * change[k]
-            upper[k, i] = middle[k] + 0.5 * change[k]
+            change[k, i] = _limited(below, above)
 
 
 @njit(**COMPILED)
-def _solve_faces(lower, upper, gamma, wall_low, wall_high, speed, push):
+def reconstruct(state, change, rate, half_dt, lower, upper):
+    """Set the states (3, n) at both faces of each cell after half a step (Toro eqs 14.42-14.43).
+
+    change: (3, n) across a cell; rate: (3, n) rates of change in time, of a moving cell.
+    """
+    for i in range(state.shape[1]):
+        density = state[0, i] + half_dt * rate[0, i]
+        pressure = state[2, i] + half_dt * rate[2, i]
+        # first order where expansion would empty the cell within half a step
+        if density <= 0.5 * abs(change[0, i]) or pressure <= 0.5 * abs(change[2, i]):
+            for k in range(3):
+                lower[k, i] = upper[k, i] = state[k, i]
+            continue
+        for k in range(3):
+            middle = state[k, i] + half_dt * rate[k, i]
+            lower[k, i] = middle - 0.5 * change[k, i]
+            upper[k, i] = middle + 0.5 * change[k, i]
+
+
+@njit(**COMPILED)
+def solve_faces(lower, upper, gamma, wall_low, wall_high, speed, push):
     """Set velocity and pressure of the contact at each face by HLLC (Toro eqs 10.36-10.37)."""
     n = lower.shape[1]
     for face in range(n + 1):

@@ -102,6 +102,14 @@ class Problem(Section):
         """(D,) centre of the box."""
         return self.box.mean(axis=1)
 
+    def under(self, physics):
+        """Return the problem with what it takes from [physics], such as the constant G of gravity.
+
+        The configuration calls this once. Raises ValueError, with a message that begins with a key
+        of [physics], if the problem cannot be set up under these physics.
+        """
+        return self
+
     def fills_box(self, eos) -> bool:
         """Return whether gas fills the box at all times, so that sum m/rho equals its volume."""
         return True

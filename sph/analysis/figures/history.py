@@ -13,6 +13,7 @@ ENERGIES = (
     ("total_energy", "total", "black", "-"),
     ("internal_energy", "internal", style.PALETTE[1], "--"),
     ("kinetic_energy", "kinetic", style.PALETTE[0], "-."),
+    ("gravitational_energy", "gravitational", style.PALETTE[2], ":"),
 )
 LABELS = {"volume_ratio": r"$\sum m/\rho$ over the volume"}
 DECADE = 10.0  # a column that spans more is drawn on a logarithmic axis
@@ -27,15 +28,17 @@ def figure(
 
     `history` is that of `sph.output.history.read`; `theory` has what is said of its columns.
     """
+    theory = theory or {}
     momentum = [name for name in history if name.startswith("momentum_")]
-    further = [name for name in history if name not in shared_columns(len(momentum))]
+    shared = {*shared_columns(len(momentum)), *(name for name, *_ in ENERGIES)}
+    further = [name for name in history if name not in shared]
     picture, panels = _panels(4 + len(further))
-    _energies(panels[0], history)
+    _energies(panels[0], history, theory)
     _drift(panels[1], history)
     _momentum(panels[2], history, momentum)
     _steps(panels[3], history)
     for panel, name in zip(panels[4:], further, strict=True):
-        _diagnostic(panel, history, name, (theory or {}).get(name))
+        _diagnostic(panel, history, name, theory.get(name))
     for panel in panels:
         if panel.get_subplotspec().is_last_row():
             panel.set_xlabel("$t$")
@@ -55,9 +58,13 @@ def _panels(count: int):
     return picture, [picture.add_subplot(cell) for cell in cells]
 
 
-def _energies(panel, history) -> None:
+def _energies(panel, history, theory) -> None:
     for name, label, colour, dashes in ENERGIES:
-        panel.plot(history["t"], history[name], dashes, color=colour, label=label)
+        if name in history:
+            panel.plot(history["t"], history[name], dashes, color=colour, label=label)
+    beside = [theory[name] for name, *_ in ENERGIES if name in theory]
+    for values, label in itertools.zip_longest(beside, ["theory"][: len(beside)]):
+        panel.plot(history["t"], values, "-", lw=0.6, color="black", label=label)
     panel.set_ylabel("$E$")
     panel.legend(loc="best")
 

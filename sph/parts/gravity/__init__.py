@@ -7,10 +7,11 @@ act through their multipole moments (`_tree`, `_forces`).
 An expansion is a file with a NamedTuple that has the parameters G, softening and opening_angle and,
 for compiled code, the method
 
-    attraction(m, Q, r, r_inv)    (pull, depth) by nodes at -r, which has the length 1/r_inv
+    attraction(m, Q, OCT, r, r_inv)    (pull, depth) by nodes at -r, which has the length 1/r_inv
+    moments()                        number of components of Q and OCT that `attraction` reads
 
-where m and Q are mass and quadrupole moments of the nodes (`_tree`), and the acceleration and the
-potential are -G times pull and depth. The name of the file is the value of the key `order`.
+where m, Q and OCT are mass, quadrupole and octupole of the nodes (`_tree`). The acceleration is
+-G times pull, and the potential -G times depth. The name of the file is the value of `order`.
 """
 
 from typing import Annotated, Literal, NamedTuple
@@ -23,12 +24,13 @@ from sph.formulations.gas.weighting import ByMass, ByNumber
 from sph.model import Model, Parameter
 from sph.part import Key, Part, Pass
 from sph.state import Field, Public
+from sph.threads import SMALLEST_RANGE
 
 FOLDER = "sph.parts.gravity"
 
 # The largest node that may act as one group is OPENING_ANGLE times its distance: errors and costs
 # of other values are in docs/gravity.md.
-OPENING_ANGLE = 0.6
+OPENING_ANGLE = 0.5
 
 Constant = Annotated[float, Parameter("gravitational constant", above=0.0)]
 Softening = Annotated[
@@ -63,7 +65,7 @@ class Expansion(Model):
 
     @classmethod
     def required(cls):
-        return "attraction", "G", "softening", "opening_angle"
+        return "attraction", "moments", "G", "softening", "opening_angle"
 
     def issues(self):
         if not self.opening_angle < 1.0:  # the series need not converge
@@ -72,11 +74,16 @@ class Expansion(Model):
 
 
 @verb
-def attraction(self, m, Q, r, r_inv):
-    return self.attraction(m, Q, r, r_inv)
+def attraction(self, m, Q, OCT, r, r_inv):
+    return self.attraction(m, Q, OCT, r, r_inv)
 
 
-attraction.takes_vectors = False  # type: ignore[attr-defined]
+@verb
+def moments(self):
+    return self.moments()
+
+
+attraction.takes_vectors = moments.takes_vectors = False  # type: ignore[attr-defined]
 
 
 class Models(NamedTuple):
@@ -98,7 +105,7 @@ class Gravity(Part):
             "may be empty",
             models=FOLDER,
             label="order",
-            default_model="quadrupole",
+            default_model="octupole",
             label_help="multipole moments of distant groups of particles",
             example={"G": 1.0},
             restart="same kind",
@@ -187,9 +194,10 @@ class Gravity(Part):
         if not self.is_adaptive:
             support = np.full(mass.size, self.expansion.softening)
         nodes = _tree.build(position, mass, support, sweep.team)
-        sweep.run(
-            attract, self.models, nodes, position, mass, support, zeta, acceleration, potential
-        )
+        sweep.team.run(
+            attract, nodes.groups.size - 1, sweep.dim, self.models, sweep.neighbours, nodes,
+            position, mass, support, zeta, acceleration, potential, smallest=SMALLEST_RANGE // 8,
+        )  # fmt: skip
 
     def energies(self, state):
         return {"gravitational_energy": 0.5 * state.potential}

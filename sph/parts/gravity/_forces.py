@@ -14,7 +14,7 @@ from sph.compiled import COMPILED, INLINED, larger, smaller
 from sph.formulations.gas.weighting import copy_weights, mass_per_weight, weight
 from sph.kernels import dw_over_q, enclosed_over_q3, normalisation, potential_depth
 from sph.neighbours.order import BLOCK
-from sph.parts.gravity import attraction
+from sph.parts.gravity import attraction, moments
 from sph.parts.gravity._tree import CENTRE, MASS, Q, walk
 from sph.passes.active import any_active, is_active
 from sph.passes.blocks import load_column, move
@@ -64,8 +64,8 @@ from sph.simd import (
 
 # Quantities of near particles after the position; the last two only with zeta.
 M, H_INV, WEIGHT, SLOPE = 3, 4, 5, 6
-# Rows of far nodes after the position and the mass: the quadrupole.
-FAR_ROWS = 9
+# Rows of far nodes: position, mass, moments.
+FAR_Q, FAR_O, FAR_ROWS = 4, 9, 16
 
 
 @njit(**COMPILED)
@@ -73,15 +73,15 @@ def attract(
     first, last, dim, models, neighbours, nodes, position, mass, support, zeta, acceleration,
     potential,
 ):  # fmt: skip
-    """Add acceleration (3, N) by gravity and set potential (N,), for superblocks [first, last).
+    """Add acceleration (3, N) by gravity and set potential (N,), for groups [first, last).
 
     zeta (N,): zeta/Omega, or None if supports do not follow the density.
     """
-    lanes, lists = neighbours.lanes, neighbours.lists
+    lanes = neighbours.lanes
     expansion, kernel, weighting = models
     every = also(dim + (0, 0), zeta, (0, 0))  # noqa: RUF005
     point = dim + (0,)  # noqa: RUF005
-    five = (0, 0, 0, 0, 0)
+    five, seven = (0, 0, 0, 0, 0), (0, 0, 0, 0, 0, 0, 0)
     C = normalisation(kernel, dim)
     box = empty(6, np.float64)
     far_nodes = empty(nodes.first.size, np.int32)
@@ -92,8 +92,8 @@ def attract(
     boxes = rows(lanes, 7, 1)
     soft, plain = rows(lanes, len(every), 1), rows(lanes, 4, 1)
     inside, outside = empty(1, np.int32), empty(1, np.int32)
-    for superblock in range(first, last):
-        begin, end = lists.first[superblock], lists.first[superblock + 1]
+    for group in range(first, last):
+        begin, end = nodes.groups[group], nodes.groups[group + 1]
         i_0, i_end = begin * BLOCK, min(end * BLOCK, mass.size)
         if not any_active(neighbours.active, i_0, i_end):
             continue
@@ -117,7 +117,9 @@ def attract(
         per_weight = unit(weight(weighting, largest_of(mass, i_0, i_end)))
         # of m zeta/(Omega H^5); zeta has the unit mass length^2/weight
         per_zeta = per_mass * per_length * per_length / per_weight
-        _copy_nodes(lanes, nodes.values, far_nodes, n_far, x_0, per_length, per_mass, far)
+        _copy_nodes(
+            lanes, expansion, nodes.values, far_nodes, n_far, x_0, per_length, per_mass, far
+        )
         for t in range(n_near):
             block = near_blocks[t]
             to = t * len(every) * BLOCK
@@ -148,8 +150,11 @@ def attract(
                 for k in range(0, n_far, width(lanes)):
                     r = minus(x_i, load_spatial(lanes, dim, far, 0, k))
                     r_inv = inverse_sqrt(dot(r, r) + TINY)
-                    moments = load_spatial(lanes, five, far, 4, k)
-                    pull, one = attraction(expansion, load(lanes, far, (3, k)), moments, r, r_inv)
+                    quadrupoles = load_spatial(lanes, five, far, FAR_Q, k)
+                    octupoles = load_spatial(lanes, seven, far, FAR_O, k)
+                    pull, one = attraction(
+                        expansion, load(lanes, far, (3, k)), quadrupoles, octupoles, r, r_inv
+                    )
                     total, depth = plus(total, pull), depth + one
                 for k in range(0, n_plain, width(lanes)):
                     r = minus(x_i, load_spatial(lanes, dim, plain, 0, k))
@@ -211,16 +216,18 @@ def _box_of(boxes, first, last, box):
 
 
 @njit(**INLINED)
-def _copy_nodes(lanes, values, chosen, number, origin, per_length, per_mass, far):
-    """Write centre, mass and quadrupole of the nodes to the columns of `far`."""
+def _copy_nodes(lanes, expansion, values, chosen, number, origin, per_length, per_mass, far):
+    """Write centre, mass and moments of the nodes to the columns of `far`."""
     per_moment = per_mass * per_length * per_length
     for t in range(number):
         k = chosen[t]
         for d in range(3):
             far[d, t] = (values[k, CENTRE + d] - origin[d]) * per_length
         far[3, t] = values[k, MASS] * per_mass
-        for component in range(5):
-            far[4 + component, t] = values[k, Q + component] * per_moment
+        for component in range(min(moments(expansion), 5)):
+            far[FAR_Q + component, t] = values[k, Q + component] * per_moment
+        for component in range(5, moments(expansion)):
+            far[FAR_Q + component, t] = values[k, Q + component] * (per_moment * per_length)
     for row in range(FAR_ROWS):
         store(far, (row, number), filled(lanes, FAR if row == 0 else 0.0))
 

@@ -15,6 +15,9 @@ class Monopole(NamedTuple):
     softening: Softening = "adaptive"
     opening_angle: Angle = OPENING_ANGLE
 
-    def attraction(self, m, Q, r, r_inv):
+    def moments(self):
+        return 0
+
+    def attraction(self, m, Q, OCT, r, r_inv):
         depth = m * r_inv
         return times(r, depth * (r_inv * r_inv)), depth

@@ -15,7 +15,10 @@ class Quadrupole(NamedTuple):
     softening: Softening = "adaptive"
     opening_angle: Angle = OPENING_ANGLE
 
-    def attraction(self, m, Q, r, r_inv):
+    def moments(self):
+        return 5
+
+    def attraction(self, m, Q, OCT, r, r_inv):
         x, y, z = r
         xx, xy, xz, yy, yz = Q
         Qr = (

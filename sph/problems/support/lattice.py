@@ -113,6 +113,29 @@ def fill(box: np.ndarray, n: int, kind: str, seed: int = 0, even: bool = False) 
     return grid(box, kind, counts)
 
 
+def ball(n: int, kind: str, dimension: int, seed: int = 0) -> np.ndarray:
+    """Return positions (D, N) in a ball of radius 1 around the origin, with N close to n.
+
+    kind: a lattice of `unit_cell`, or "relaxed". The ball ends between two shells of the lattice
+    where the number of sites inside equals volume over that of a cell, so the share of the
+    particles within r is r^D except for the granularity of the lattice.
+    """
+    margin = 1.1  # of the cube, so that there is such an end on either side of n
+    cube = margin * np.array([[-1.0, 1.0]] * dimension)
+    sites = max(4**dimension, round(n * margin**dimension * CUBE_OVER_BALL[dimension - 1]))
+    position = fill(cube, sites, kind, seed, even=True)
+    cell = CUBE_OVER_BALL[dimension - 1] * margin**dimension / position.shape[1]  # of the ball
+    distance = np.sqrt((position**2).sum(axis=0))
+    order = np.argsort(distance, kind="stable")
+    shells, count = distance[order], np.arange(1, distance.size)
+    end = (count * cell) ** (1.0 / dimension)
+    fits = (shells[:-1] <= end) & (end < shells[1:]) & (end < margin)
+    if not fits.any():
+        raise ValueError(f"n = {n}: expected more particles for a ball of a lattice")
+    chosen = int(np.argmin(np.where(fits, np.abs(count - n), n + distance.size)))
+    return position[:, np.sort(order[: chosen + 1])] / end[chosen]
+
+
 def spacing(box: np.ndarray, n: int) -> float:
     """Return the particle spacing of n particles in `box` (D, 2): (volume/n)^(1/D)."""
     return float((np.prod(box[:, 1] - box[:, 0]) / n) ** (1.0 / len(box)))

@@ -382,6 +382,19 @@ def test_history_figure_shows_drift_limiter_and_diagnostics(shear):
     np.testing.assert_array_equal(lines(mode)[1][1], beside["mode_amplitude"])
 
 
+def test_history_figure_shows_gravitational_energy_and_theory_of_energies(shear):
+    found = read_history(shear.history)
+    found["gravitational_energy"] = np.array([-2.0, -3.0])
+    beside = {name: np.array([1.0, 2.0]) for name in ("kinetic_energy", "gravitational_energy")}
+    panels = history.figure(found, "a run", beside).axes
+    assert len(panels) == 5  # no panel of its own, unlike the mode's amplitude
+    drawn = [line[1].tolist() for line in lines(panels[0])]
+    assert drawn[3:] == [[-2.0, -3.0], [1.0, 2.0], [1.0, 2.0]]
+    assert [text.get_text() for text in panels[0].get_legend().get_texts()] == [
+        "total", "internal", "kinetic", "gravitational", "theory",
+    ]  # fmt: skip
+
+
 # --- style ------------------------------------------------------------------------------------
 
 

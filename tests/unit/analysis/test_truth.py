@@ -56,11 +56,13 @@ ENDS = {
     ),
     "shu_osher": ("shu_osher", (), 9.5 / (math.sqrt(1.4) * (3.0 + 1.25**0.5)), "from the end"),
     "sound_wave": ("sound_wave", ("problem.amplitude=0.1",), 1 / (0.1 * math.pi * 8 / 3), "breaks"),
+    "evrard": ("evrard", (), 10.0, "computation of the reference"),
     "keplerian_ring": ("keplerian_ring", (), 0.15 / math.sqrt(5e-6 / 3), "ring's edges"),
 }  # fmt: skip
 FOR_EVER = {
     "blast_waves", "blob", "contrast", "expanding_ball", "gresho", "kelvin_helmholtz",
-    "kelvin_helmholtz_smooth", "particles", "rayleigh_taylor", "square", "uniform", "yee",
+    "kelvin_helmholtz_smooth", "particles", "polytrope", "rayleigh_taylor", "square", "uniform",
+    "yee",
 }  # fmt: skip
 
 

@@ -69,7 +69,8 @@ def test_pressure_energy_with_other_gas_is_refused(messages, tmp_path, monkeypat
 
 
 @pytest.mark.parametrize(
-    "problem", ["sound_wave", "gresho", "yee", "noh", "point_explosion", "expanding_ball"]
+    "problem",
+    ["sound_wave", "gresho", "yee", "noh", "point_explosion", "expanding_ball", "polytrope"],
 )
 def test_problem_for_ideal_gas_with_other_gas_is_refused(messages, problem):
     def read(p_inf):
