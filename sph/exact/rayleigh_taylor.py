@@ -6,15 +6,9 @@ with the field g pointing to -y and walls at both ends, makes the quotient
     s^2 = int [-R c^2 D^2 + 2 g R Y D + g R' Y^2] dy / int R (X^2 + Y^2) dy,    D = kX + Y'
 
 stationary (eq 255; Bernstein et al. 1958, Proc. R. Soc. A 244, 17, without a magnetic field).
-<<<<<<< HEAD
 D is the divergence. The fastest mode has the largest s^2. Finite elements: X is constant in a cell,
 Y is linear. Density may jump at faces, where R' is a delta function, so sharp interfaces need no
 special treatment. The error is of second order in the width of the cells.
-=======
-D is the divergence. The fastest mode has the largest s^2. Finite elements: X is constant in a
-cell, Y is linear. Density may jump at faces, where R' is a delta function, so sharp interfaces need
-no special treatment. The error is of second order in the width of the cells.
->>>>>>> wip-rt
 """
 
 from typing import NamedTuple
