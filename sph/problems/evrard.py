@@ -251,7 +251,8 @@ def _steepest(radius: np.ndarray, speed: np.ndarray, density: np.ndarray) -> flo
     order = np.argsort(radius)
     r, v = radius[order], speed[order]
     w = 1.0 / (density[order] * r * r)
-    at = np.geomspace(*np.quantile(r, INNER_AND_OUTER), RADII)
+    inner, outer = (float(np.quantile(r, share)) for share in INNER_AND_OUTER)
+    at = np.geomspace(inner, outer, RADII)
     low, high = np.searchsorted(r, (1.0 - WINDOW) * at), np.searchsorted(r, (1.0 + WINDOW) * at)
     sums = (
         np.concatenate([[0.0], np.cumsum(one)]) for one in (w, w * r, w * v, w * r * r, w * r * v)
