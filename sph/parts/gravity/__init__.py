@@ -180,11 +180,12 @@ class Gravity(Part):
         return found
 
     def described(self):
-        softening = (
-            "kernel of each particle" if self.is_adaptive else f"H = {self.expansion.softening:g}"
-        )
-        text = f"self-gravity: {self.expansion.name}, softened by the {softening}"
-        return [text], []
+        length = self.expansion.softening
+        by = "H of each particle" if self.is_adaptive else f"H = {length:g} for all particles"
+        return [
+            self.title,
+            f"multipole moments to the {self.expansion.name}, softening by {by}",
+        ], []
 
     def _attract(self, sweep, position, mass, support, zeta, acceleration, potential) -> None:
         """Add the acceleration (D, N) by gravity, and set the potential (N,)."""
