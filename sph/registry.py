@@ -99,11 +99,13 @@ def part_class(package: str, name: str) -> type[Part]:
 def model(package: str, choice: str | dict[str, Any] | None, label: str = "name"):
     """Return the model that a value of the configuration names, or None if `choice` is None.
 
-    choice: a name, or a table of parameters with the name under the key `label`.
+    choice: a name, or a table of parameters with the name under the key `label`. A list becomes a
+    tuple, which can be hashed and compiled.
     """
     if choice is None:
         return None
-    parameters = {label: choice} if isinstance(choice, str) else dict(choice)
+    table = {label: choice} if isinstance(choice, str) else choice
+    parameters = {key: tuple(one) if isinstance(one, list) else one for key, one in table.items()}
     return model_class(package, parameters.pop(label))(**parameters)
 
 

@@ -4,7 +4,6 @@ Shells of equal mass, with the density 1/(2 pi r) and one internal energy, evolv
 """
 
 from functools import lru_cache
-from typing import NamedTuple
 
 import numpy as np
 
@@ -43,22 +42,15 @@ def radius_of_mass(cells: Cells, share) -> np.ndarray:
     return np.interp(share, inside / inside[-1], cells.faces)
 
 
-class Shock(NamedTuple):
-    """Radius of a shock, and the mean of the velocities on its two sides."""
-
-    radius: float
-    middle: float
-
-
-def shock(cells: Cells) -> Shock | None:
-    """Return the shock where the velocity is steepest, or None if its jump is small."""
+def shock(cells: Cells) -> float | None:
+    """Return the radius of the shock, where velocity is steepest, or None if its jump is small."""
     centres = 0.5 * (cells.faces[1:] + cells.faces[:-1])
     steepest = int(np.argmin(np.diff(cells.velocity) / np.diff(centres)))
     behind = cells.velocity[max(0, steepest - WIDTH)]
     ahead = cells.velocity[min(centres.size - 1, steepest + 1 + WIDTH)]
     if behind - ahead < LEAST_JUMP:
         return None
-    return Shock(float(cells.faces[steepest + 1]), float(0.5 * (behind + ahead)))
+    return float(cells.faces[steepest + 1])
 
 
 def extremes(times, kinetic, internal, gravitational) -> dict[str, tuple[float, float]]:

@@ -10,9 +10,19 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
+from sph.arrays import empty
 from sph.compiled import COMPILED, INLINED
 from sph.neighbours.order import BLOCK
-from sph.passes.gather import unpacked
+from sph.passes.gather import (
+    copy_box,
+    longest_list,
+    middle,
+    near_blocks,
+    own_box,
+    unit,
+    unpacked,
+)
+from sph.simd import rows
 
 RATIO = 4.0
 
@@ -58,43 +68,47 @@ def limit(first, last, dim, models, neighbours, position, support, length, block
     particles within the larger of both support radii. A pair without an active particle was
     considered when the last of both was active, and is left out.
     """
-    lists = neighbours.lists
+    lists, lanes = neighbours.lists, neighbours.lanes
+    room = longest_list(first, last, lists)
+    boxes, chosen = rows(lanes, 2 * len(dim) + 1, room + BLOCK), empty(room + BLOCK, np.int32)
+    entries = empty(room, np.int64)
     for superblock in range(first, last):
         begin, end = lists.first[superblock], lists.first[superblock + 1]
-        most = most_active = 0.0
+        x_0 = middle(dim, neighbours, begin, end)
+        widest = longest = longest_active = 0.0
         for own in range(begin, end):
-            most = max(most, blocks.longest[own])
-            most_active = max(most_active, blocks.longest_active[own])
+            widest = max(widest, blocks.widest[own])
+            longest = max(longest, blocks.longest[own])
+            longest_active = max(longest_active, blocks.longest_active[own])
+        per_length = unit(widest)
         for i in range(begin * BLOCK, min(end * BLOCK, length.size)):
             allowed[i] = np.inf
+        number = 0
         for t in range(lists.count[superblock]):
-            block, image = unpacked(lists.entries[lists.start[superblock] + t])
-            least = RATIO * blocks.shortest[block]
-            least_active = RATIO * blocks.shortest_active[block]
-            if not (least_active < most or least < most_active):
-                continue
-            for own in range(begin, end):
-                if not (least_active < blocks.longest[own] or least < blocks.longest_active[own]):
-                    continue
-                reach = max(blocks.widest[own], blocks.widest[block])
-                if _squared_gap(dim, neighbours, own, block, image) < reach * reach:
+            entry = lists.entries[lists.start[superblock] + t]
+            block, image = unpacked(entry)
+            if _may_limit(blocks, block, longest, longest_active):
+                reach = blocks.widest[block] * per_length
+                copy_box(dim, boxes, number, neighbours, block, image, x_0, per_length, reach)
+                entries[number] = entry
+                number += 1
+        for own in range(begin, end * min(number, 1)):
+            low, high = own_box(dim, neighbours, own, x_0, per_length)
+            reach = blocks.widest[own] * per_length
+            near = near_blocks(lanes, dim, boxes, number, low, high, reach, chosen)
+            for t in range(near):
+                block, image = unpacked(entries[chosen[t]])
+                if _may_limit(blocks, block, blocks.longest[own], blocks.longest_active[own]):
                     _limit_block(
                         dim, neighbours, position, support, length, own, block, image, allowed
                     )
 
 
 @njit(**INLINED)
-def _squared_gap(dim, neighbours, own, block, image):
-    """Return the squared distance between the box of a block and an image of that of another."""
-    D, boxes = len(dim), neighbours.boxes
-    sign, offset = neighbours.images
-    squared = 0.0
-    for d in range(D):
-        s, o = sign[image, d], offset[image, d]
-        a, b = s * boxes[block, d] + o, s * boxes[block, D + d] + o
-        gap = max(0.0, max(min(a, b) - boxes[own, D + d], boxes[own, d] - max(a, b)))
-        squared += gap * gap
-    return squared
+def _may_limit(blocks, block, longest, longest_active):
+    """Return whether a block may limit particles of which these are the longest steps."""
+    by_active = RATIO * blocks.shortest_active[block] < longest
+    return by_active or RATIO * blocks.shortest[block] < longest_active
 
 
 @njit(**INLINED)

@@ -218,12 +218,13 @@ def wide(least: float) -> AfterValidator:
     return AfterValidator(check)
 
 
-def only(domain: list[float]) -> AfterValidator:
-    """Annotates the domain of a problem that is set up for no other."""
+def only(domain: list) -> AfterValidator:
+    """Annotates the domain of a problem that is set up for no other: [lo, hi], or one per axis."""
 
     def check(given):
         if given not in (domain, [domain, domain]):
-            raise ValueError(f"this problem is set up for {domain} along both axes only")
+            axes = "" if isinstance(domain[0], list) else "along both axes "
+            raise ValueError(f"this problem is set up for {domain} {axes}only")
         return given
 
     return AfterValidator(check)

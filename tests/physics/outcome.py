@@ -19,6 +19,7 @@ class Outcome:
     energies: list[float]
     momenta: list
     diagnostics: list[dict]
+    times: list[float]
 
     @property
     def particles(self):
@@ -46,11 +47,12 @@ def simulate(config, max_steps: int | None = None) -> Outcome:
     """Run to config.time.end, or for max_steps steps."""
     clock = Clock()
     simulation = Simulation.start(Scene(config), threads=2, clock=clock)
-    outcome = Outcome(simulation, [], [], [])
+    outcome = Outcome(simulation, [], [], [], [])
 
     def note():
         outcome.energies.append(simulation.totals.energy)
         outcome.momenta.append(simulation.totals.momentum)
+        outcome.times.append(simulation.time)
         outcome.diagnostics.append(config.problem.diagnostics(simulation.particles))
 
     note()

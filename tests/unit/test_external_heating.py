@@ -7,6 +7,7 @@ import pytest
 
 from sph import config as configuration
 from sph.parts.external.point_mass import PointMass
+from sph.parts.external.uniform import Uniform
 from sph.parts.heating.relaxation import Relaxation
 
 BOX = """
@@ -57,6 +58,31 @@ def test_point_mass_acceleration_equals_slope_of_potential(dimension, softening)
 
 def test_point_mass_at_centre_has_no_acceleration():
     assert (PointMass(1.0).acceleration(np.zeros((3, 1))) == 0).all()
+
+
+@pytest.mark.parametrize("g", [(2.0,), (0.5, -1.0), (1.0, 0.0, -3.0)])
+def test_uniform_acceleration_equals_slope_of_potential(g):
+    field = Uniform(g)
+    x = np.random.default_rng(1).normal(size=(len(g), 5))
+    assert (field.acceleration(x) == np.array(g)[:, None]).all()
+    assert field.potential(np.zeros((len(g), 1)))[0] == 0.0
+    for axis, along in enumerate(np.eye(len(g))):
+        change = field.potential(x + along[:, None]) - field.potential(x)
+        # a difference of numbers up to 10: round-off
+        assert -change == pytest.approx(np.full(5, g[axis]), rel=1e-14, abs=1e-14)
+
+
+def test_gas_in_uniform_field_falls_freely(begin):
+    """Until it meets a boundary, of which an open box has none."""
+    simulation = begin(["physics.external={name='uniform',g=[-2.0]}"], boundary="open")
+    start, energy = simulation.totals.momentum.copy(), simulation.totals.energy
+    while simulation.time < 0.05:
+        simulation.advance(0.05)
+    p = simulation.particles
+    gained = (simulation.totals.momentum - start) / p.mass.sum()
+    # pair forces cancel, and the leapfrog of a constant acceleration is exact: round-off
+    assert gained == pytest.approx([-0.1], rel=1e-11)
+    assert simulation.totals.energy == pytest.approx(energy, rel=1e-3)  # gas expands into vacuum
 
 
 def test_gas_in_external_field_conserves_total_energy(begin):

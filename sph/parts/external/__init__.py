@@ -22,7 +22,7 @@ FOLDER = "sph.parts.external"
 class Field(Model):
     """Defaults of an external field."""
 
-    softening = 0.0  # a length; 0 for fields without softening
+    softening = None  # a length; None for fields that cannot be softened
 
     @classmethod
     def required(cls):
@@ -39,7 +39,7 @@ class External(Part):
     keys = (
         Key(
             "external",
-            "external gravitational field, with G = 1; none if not given",
+            "external gravitational field; none if not given",
             models=FOLDER,
             example={"name": "point_mass", "mass": 1.0},
             restart="refused",
@@ -74,6 +74,8 @@ class External(Part):
         return {"potential_energy": self.field.potential(state.position)}
 
     def remedies(self, trouble, held_by):
+        if self.field.softening is None:
+            return []
         softening = f"a {'larger ' * (self.field.softening > 0.0)}softening of physics.external"
         if trouble == "endless energy":
             return [f"{softening}, or no particle at the position of its mass"]

@@ -86,7 +86,7 @@ def moments(self):
 attraction.takes_vectors = moments.takes_vectors = False  # type: ignore[attr-defined]
 
 
-class Models(NamedTuple):
+class GravityModels(NamedTuple):
     """The models in the compiled loops."""
 
     expansion: tuple
@@ -122,7 +122,7 @@ class Gravity(Part):
         self.expansion = expansion
         self.is_adaptive = expansion.softening == "adaptive"
         length = 0.0 if self.is_adaptive else expansion.softening
-        self.models = Models(expansion._replace(softening=length), kernel, weighting)
+        self.models = GravityModels(expansion._replace(softening=length), kernel, weighting)
         self.fields = (POTENTIAL,)
         if self.is_adaptive:
             from sph.parts.gravity._zeta import find_zeta

@@ -61,7 +61,8 @@ ENDS = {
 }  # fmt: skip
 FOR_EVER = {
     "blast_waves", "blob", "contrast", "expanding_ball", "gresho", "kelvin_helmholtz",
-    "kelvin_helmholtz_smooth", "particles", "square", "uniform", "yee",
+    "kelvin_helmholtz_smooth", "particles", "polytrope", "rayleigh_taylor", "square", "uniform",
+    "yee",
 }  # fmt: skip
 
 

@@ -1,5 +1,7 @@
 """Schemes as the configuration takes them."""
 
+import tomllib
+
 import pytest
 
 from sph import config, eos, registry
@@ -67,7 +69,8 @@ def test_pressure_energy_with_other_gas_is_refused(messages, tmp_path, monkeypat
 
 
 @pytest.mark.parametrize(
-    "problem", ["sound_wave", "gresho", "yee", "noh", "point_explosion", "expanding_ball"]
+    "problem",
+    ["sound_wave", "gresho", "yee", "noh", "point_explosion", "expanding_ball", "polytrope"],
 )
 def test_problem_for_ideal_gas_with_other_gas_is_refused(messages, problem):
     def read(p_inf):
@@ -114,6 +117,37 @@ def test_point_mass_in_periodic_box_is_refused(messages, boundary, is_wrong):
         return
     with messages.raised(ConfigError, "line 5: physics.external", "Try: "):
         config.from_text(text, "a")
+
+
+@pytest.mark.parametrize(
+    ("boundary", "g"),
+    [
+        ('"periodic"', "[0.0, 1.0]"),
+        ('["periodic", "mirror"]', "[1e-3, 1.0]"),
+        ('"mirror"', "[1.0]"),
+        ('"mirror"', "[]"),
+        ('"mirror"', "[0.0, 0.0, 1.0]"),
+        ('"mirror"', "1.0"),
+        ('"mirror"', '[0.0, "1.0"]'),
+        ('"mirror"', "[0.0, inf]"),
+    ],
+)
+def test_uniform_field_of_wrong_length_or_along_periodic_axis_is_refused(messages, boundary, g):
+    field = f'external = {{ name = "uniform", g = {g} }}'
+    text = f'[problem]\nname = "uniform"\ndimension = 2\nboundary = {boundary}\n[physics]\n'
+    with messages.raised(ConfigError, "line 6: physics.external", "g"):
+        config.from_text(text + field, "a")
+
+
+@pytest.mark.parametrize(
+    ("boundary", "g"),
+    [('["periodic", "mirror"]', "[0, -1]"), ('"periodic"', "[0.0, 0.0]"), ('"open"', "[1.0, 2.0]")],
+)
+def test_uniform_field_across_periodic_axes_is_accepted(boundary, g):
+    field = f'external = {{ name = "uniform", g = {g} }}'
+    text = f'[problem]\nname = "uniform"\ndimension = 2\nboundary = {boundary}\n[physics]\n{field}'
+    (found,) = (p.field for p in Scene(config.from_text(text)).parts if isinstance(p, External))
+    assert found.g == tuple(tomllib.loads(f"g = {g}")["g"])
 
 
 @pytest.mark.parametrize(
