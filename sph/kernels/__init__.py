@@ -34,7 +34,7 @@ class Kernel(Protocol):
     def force_over_q(self, dim: Dim, q: Any) -> Any:
         """The value that replaces dw_over_q in the pair force (eqs 22-23); usually equal to it."""
 
-    # The two methods below are for self-gravity in 3-D (eqs 300-301), and for q <= 1 only. A
+    # The two methods below are for self-gravity in 3-D (eqs 300 and 301), and for q <= 1 only. A
     # kernel may lack them: scenes with gravity then refuse the kernel.
 
     def enclosed_over_q3(self, q: Any) -> Any:

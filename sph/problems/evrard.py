@@ -251,8 +251,8 @@ def _steepest(radius: np.ndarray, speed: np.ndarray, density: np.ndarray) -> flo
     order = np.argsort(radius)
     r, v = radius[order], speed[order]
     w = 1.0 / (density[order] * r * r)
-    inner, outer = np.quantile(r, INNER_AND_OUTER)
-    at = np.geomspace(float(inner), float(outer), RADII)
+    inner, outer = (float(np.quantile(r, share)) for share in INNER_AND_OUTER)
+    at = np.geomspace(inner, outer, RADII)
     low, high = np.searchsorted(r, np.outer((1.0 - WINDOW, 1.0 + WINDOW), at))
     enough = high - low >= FEWEST
     if not enough.any():

@@ -42,7 +42,7 @@ class Kernel:
         return self._at(self.mass, q)
 
     def depth(self, q):
-        """-phi H/(G m) (eq 301), q > 0."""
+        """-phi H/(G m) (eq 300), q > 0."""
         whole = self.work[-1](1.0)
         return self.enclosed(q) / q + whole - self._at(self.work, q)
 
@@ -72,7 +72,7 @@ def energy(kernel, position, mass, support):
 
 
 def attraction(kernel, position, mass, support):
-    """(acceleration, potential) with both kernels' mean and constant supports, eqs 303 and 304."""
+    """(acceleration, potential) with both kernels' mean and constant supports, eqs 303 and 305."""
     pairs = Pairs(position)
     own, other = (potentials(kernel, pairs.r, H) for H in (support[:, None], support[None, :]))
     pull = 0.5 * (own[1] + other[1]) / pairs.r
@@ -80,14 +80,14 @@ def attraction(kernel, position, mass, support):
 
 
 def zeta_over_omega(scene, kernel, position, mass, rates):
-    """(N,), eq 305; rates: those of `dense.rates`."""
+    """(N,), eq 304; rates: those of `dense.rates`."""
     by_support = potentials(kernel, Pairs(position).r, rates.support[:, None])[2] @ mass
     n = rates.density * scene.weight(mass) / mass
     return -rates.support / (3 * n) * by_support / rates.omega
 
 
 def correction(scene, position, mass, support, zeta):
-    """Acceleration of supports that follow the density, eq 306; zeta: zeta/Omega."""
+    """Acceleration of supports that follow the density, in eq 305; zeta: zeta/Omega."""
     pairs, weight = Pairs(position), scene.weight(mass)
     own = scene.kernel_at(pairs.r, support[:, None])[1] * zeta[:, None] * weight[None, :]
     other = scene.kernel_at(pairs.r, support[None, :])[1] * (zeta * mass)[None, :]

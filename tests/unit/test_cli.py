@@ -283,7 +283,7 @@ def test_list_names_every_choice():
         "eos": "sph.eos", "schemes": "sph.formulations.gas.schemes",
         "viscosity.switches": "sph.parts.viscosity.switches",
         "conductivity": "sph.parts.conductivity", "external": "sph.parts.external",
-        "heating": "sph.parts.heating",
+        "gravity": "sph.parts.gravity", "heating": "sph.parts.heating",
     }.items():  # fmt: skip
         named = [line.split()[0] for line in sections[section].splitlines()]
         assert named == registry.names(package, folders=section == "formulations")

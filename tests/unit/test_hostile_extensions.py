@@ -199,7 +199,10 @@ BROKEN_PARTS = {
         with_body('fields = (Field("a", public=Public("Density", 0, 0, 0, 0, "")),)'),
         "'Density' is reserved",
     ),
-    "a stage": (with_pass('"later", "x", print, (), ()'), "stage 'later': expected one of density"),
+    "a stage": (
+        with_pass('"later", "x", print, (), ()'),
+        "stage 'later': expected one of prediction, density",
+    ),
     "a pass that reads nothing": (with_pass('"rates", "x", print, ("b",), ()'), "'b' is not a f"),
     "a pass that writes nothing": (with_pass('"rates", "x", print, (), ("b",)'), "'b' is not a f"),
     "names as a text": (with_pass('"rates", "x", print, "mass", ()'), "reads = 'mass': expected"),

@@ -316,7 +316,8 @@ def test_first_step_follows_new_courant_number_and_limit():
     now = before.override(["physics.C=0.075", "physics.energy_limit=true"])
     # 0.75 is the least of u/|du/dt|; gas without any energy sets none
     energy, rate = np.array([3.0, 1.0, 0.0]), np.array([-4.0, 0.5, 9.0])
-    particles = SimpleNamespace(internal_energy=energy, energy_rate=rate)
+    arrays = {"internal_energy": energy, "energy_rate": rate}
+    particles = SimpleNamespace(**arrays, get=arrays.get)
     for next_step, expected in ((1.0, 0.075 * 0.75), (0.01, 0.005)):
         checkpoint = SimpleNamespace(config=before, particles=particles, next_step=next_step)
         assert restarting._coming_step(now, checkpoint) == pytest.approx(expected, rel=1e-14)

@@ -10,7 +10,6 @@ from sph import config as configuration
 from sph import threads
 from sph.errors import NumericalError
 from sph.output.checkpoint import state_hash
-from sph.part import Rule
 from sph.state import State
 from sph.threads import SMALLEST_RANGE, Team
 
@@ -269,7 +268,9 @@ def test_injected_energy_counts_both_half_steps(begin):
 
         return updated
 
-    rule = Rule(injecting(energy.rule.predict, 5.0), injecting(energy.rule.correct, 7.0))
+    rule = energy.rule._replace(
+        predict=injecting(energy.rule.predict, 5.0), correct=injecting(energy.rule.correct, 7.0)
+    )
     simulation.evolved = (energy._replace(rule=rule),)
     simulation.advance(math.inf)
     assert simulation.energy_injected == 12.0

@@ -178,11 +178,12 @@ KEPT = {
 class FakeSimulation:
     """What a warning looks at of a simulation, and nothing amiss in it."""
 
-    def __init__(self, limits=None, swamped=None, precision="double"):
+    def __init__(self, limits=None, swamped=None, precision="double", inexact=()):
         self.held_supports = 0
         self.max_support, self.number = 0.125, 40
         self.scene = self.config = self.problem = self.particles = self.run = self
         self.precision = precision
+        self.inexact_momentum = inexact
         self.swamped = swamped or {}
         self.allowed = lambda: limits or {}
 
@@ -230,6 +231,12 @@ def test_momentum_in_single_precision_has_limit_of_its_own(kinds_of):
     assert kinds_of({"momentum_change": 0.9e-6}, limits=limits) == ["limit"]
     assert kinds_of({"momentum_change": 0.9e-4}, **single) == []
     assert kinds_of({"momentum_change": 1.1e-4}, **single) == ["momentum"]
+
+
+def test_momentum_that_is_not_exact_has_limit_of_its_own(kinds_of):
+    inexact = {"inexact": ["self-gravity", "individual time steps"]}
+    assert kinds_of({"momentum_change": 0.9e-3}, **inexact) == []
+    assert kinds_of({"momentum_change": 1.1e-3}, **inexact) == ["momentum"]
 
 
 def test_nearest_neighbour_below_half_spacing_warns_of_pairs(kinds_of):

@@ -86,7 +86,7 @@ def moments(self):
 attraction.takes_vectors = moments.takes_vectors = False  # type: ignore[attr-defined]
 
 
-class Models(NamedTuple):
+class GravityModels(NamedTuple):
     """The models in the compiled loops."""
 
     expansion: tuple
@@ -122,7 +122,7 @@ class Gravity(Part):
         self.expansion = expansion
         self.is_adaptive = expansion.softening == "adaptive"
         length = 0.0 if self.is_adaptive else expansion.softening
-        self.models = Models(expansion._replace(softening=length), kernel, weighting)
+        self.models = GravityModels(expansion._replace(softening=length), kernel, weighting)
         self.fields = (POTENTIAL,)
         if self.is_adaptive:
             from sph.parts.gravity._zeta import find_zeta
@@ -180,11 +180,12 @@ class Gravity(Part):
         return found
 
     def described(self):
-        softening = (
-            "kernel of each particle" if self.is_adaptive else f"H = {self.expansion.softening:g}"
-        )
-        text = f"self-gravity: {self.expansion.name}, softened by the {softening}"
-        return [text], []
+        length = self.expansion.softening
+        by = "H of each particle" if self.is_adaptive else f"H = {length:g} for all particles"
+        return [
+            self.title,
+            f"multipole moments to the {self.expansion.name}, softening by {by}",
+        ], []
 
     def _attract(self, sweep, position, mass, support, zeta, acceleration, potential) -> None:
         """Add the acceleration (D, N) by gravity, and set the potential (N,)."""

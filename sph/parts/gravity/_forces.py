@@ -1,9 +1,10 @@
-"""The pass for acceleration and potential by gravity, from the nodes of the tree (eqs 303-307).
+"""The pass for acceleration and potential by gravity (eqs 303-309).
 
-For each superblock one walk finds the nodes that act as a whole, and the blocks whose particles act
-one by one. For each block, these particles are sorted into those that may be within a support of a
-particle of the block, whose force is softened, and others, whose force is Newton's. Every sum is
-relative to the superblock and in its units (`sph.passes.gather`).
+For each group of blocks one walk through the tree finds the nodes that act as a whole, and the
+blocks whose particles act one by one. For each block of the group, these particles are sorted into
+those that may be within a support of a particle of the block, whose force is softened, and others,
+whose force is Newton's. Every sum is relative to the group and in its units, as those of other
+passes are to a superblock (`sph.passes.gather`).
 """
 
 import numpy as np

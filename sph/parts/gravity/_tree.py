@@ -1,4 +1,4 @@
-"""The nodes of the block tree with their moments, and the walk that sorts nodes into far and near.
+"""Nodes of the block tree with their moments, and the walk that finds far and near ones.
 
 Nodes have the indices and blocks of `sph.neighbours.tree`. Moments are computed anew in each step,
 from the present positions, so nothing is kept between steps.
@@ -10,16 +10,17 @@ import numpy as np
 from numba import njit
 
 from sph.arrays import empty
-from sph.compiled import COMPILED, INLINED
+from sph.compiled import COMPILED, INLINED, larger
 from sph.neighbours.order import BLOCK, number_of_blocks
 from sph.threads import Team
 
 # Blocks of a group, at most: a subtree whose particles share one walk through the tree.
 GROUP = 4
 
-# Columns of `values`. Moments are those about the centre of mass (eqs 305 and 306), without their
+# Columns of `values`. Moments are those about the centre of mass (eq 307), without their
 # traces: the quadrupole xx, xy, xz, yy, yz and the octupole xxx, xxy, xxz, xyy, xyz, yyy, yyz.
-CENTRE, MASS, Q, OCT, RADIUS, SUPPORT, LOW, HIGH, COLUMNS = 0, 3, 4, 9, 16, 17, 18, 21, 24
+# Those that the walk reads come first.
+CENTRE, RADIUS, SUPPORT, LOW, HIGH, MASS, Q, OCT, COLUMNS = 0, 3, 4, 5, 8, 11, 12, 17, 24
 
 
 class Nodes(NamedTuple):
@@ -169,6 +170,12 @@ def _sum_nodes(first, last, values):
 
 
 @njit(**INLINED)
+def _gap(box, d, low, high):
+    """Return the gap along axis d between a box and the interval from low to high, 0 for none."""
+    return larger(0.0, larger(box[d] - high, low - box[3 + d]))
+
+
+@njit(**INLINED)
 def walk(nodes, box, reach, opening_angle, far, near):
     """Write nodes that act as a whole on a group to `far`, and blocks of the others to `near`.
 
@@ -184,14 +191,16 @@ def walk(nodes, box, reach, opening_angle, far, near):
     while depth > 0:
         depth -= 1
         k = stack[depth]
-        to_centre = to_box = 0.0
+        squared = 0.0
         for d in range(3):
-            low, high = box[d], box[3 + d]
-            x = values[k, CENTRE + d]
-            to_centre += max(0.0, low - x, x - high) ** 2
-            to_box += max(0.0, low - values[k, HIGH + d], values[k, LOW + d] - high) ** 2
-        H = max(reach, values[k, SUPPORT])
-        if values[k, RADIUS] ** 2 < opening_angle * opening_angle * to_centre and to_box >= H * H:
+            squared += _gap(box, d, values[k, CENTRE + d], values[k, CENTRE + d]) ** 2
+        is_far = values[k, RADIUS] ** 2 < opening_angle * opening_angle * squared
+        if is_far:
+            squared = 0.0
+            for d in range(3):
+                squared += _gap(box, d, values[k, LOW + d], values[k, HIGH + d]) ** 2
+            is_far = squared >= max(reach, values[k, SUPPORT]) ** 2
+        if is_far:
             far[n_far] = k
             n_far += 1
         elif last[k] - first[k] == 1:

@@ -1,4 +1,4 @@
-"""Expansion to octupoles (eqs 309 and 310)."""
+"""Expansion to octupoles (eqs 308 and 309)."""
 
 from typing import NamedTuple
 
@@ -27,7 +27,7 @@ class Octupole(NamedTuple):
             xy * x + yy * y + yz * z,
             xz * x + yz * y - (xx + yy) * z,  # traceless
         )
-        # OCT r for each pair of axes, and OCT r r
+        # the octupole times r by pair of axes (xx, xy, xz, yy, yz), and times r r
         a = xxx * x + xxy * y + xxz * z
         b = xxy * x + xyy * y + xyz * z
         c = xxz * x + xyz * y - (xxx + xyy) * z

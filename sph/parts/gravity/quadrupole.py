@@ -1,4 +1,4 @@
-"""Expansion to quadrupoles (eqs 306 and 307)."""
+"""Expansion to quadrupoles (eqs 308 and 309)."""
 
 from typing import NamedTuple
 

@@ -17,6 +17,8 @@ from sph.output import checkpoint
 from sph.output.history import History
 from sph.output.history import read as read_history
 from sph.output.run_directory import RunDirectory
+from sph.scene import Scene
+from sph.totals import Baseline, Budget
 
 SMALL = {"shock_tube": 60, "point_explosion": 512, "particles": 4}
 SETS = {
@@ -55,6 +57,7 @@ def state_of(problem: str, *overrides: str, time: float | None = None) -> State:
     particles.support[:] = (
         ratio * made.physics.eta * (particles.mass / particles.density) ** (1 / D)
     )
+    particles.declare(Scene(made).fields)  # others that the scene has are zero
     lists = {
         "list_position": particles.position.copy(),
         "list_support": particles.support.copy(),
@@ -62,7 +65,14 @@ def state_of(problem: str, *overrides: str, time: float | None = None) -> State:
     }
     return State(
         checkpoint.Checkpoint(
-            particles, time, step=3, next_step=0.1, **lists, config=made, lineage=()
+            particles,
+            time,
+            step=3,
+            next_step=0.1,
+            **lists,
+            config=made,
+            lineage=(),
+            budget=Budget(0.0, 0.0, Baseline(1.0, 1.0)),
         )
     )
 

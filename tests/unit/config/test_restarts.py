@@ -22,6 +22,7 @@ interval = 0.05
 """
 HEATING = 'physics.heating={ name = "relaxation", energy = 1.0, time = 0.1 }'
 RANGE = "physics.alpha={ min = 0.1, max = 2.0 }"
+GRAVITY = ["problem.dimension=3", "physics.gravity={ G = 1.0 }"]  # not in 1-D
 
 PHYSICS = {name: physics.table(name) for name in registry.names(physics.FORMULATIONS, folders=True)}
 TABLES = {"physics": PHYSICS[physics.DEFAULT], **SECTIONS}
@@ -53,7 +54,7 @@ def test_every_key_has_a_class(name):
 
 
 def test_every_key_is_covered_by_these_tests():
-    tried = {override.partition("=")[0] for override in FREE + RECORDED + REFUSED}
+    tried = {override.partition("=")[0] for override in FREE + RECORDED + REFUSED + GRAVITY}
     keys = {f"{name}.{key}" for name, table in TABLES.items() for key in table.model_fields}
     assert len(PHYSICS) == 1  # so there is no other value to try of the key that names it
     assert keys - {"physics.formulation"} <= tried
@@ -89,6 +90,8 @@ def test_restart_key_of_initial_state_is_refused(override):
     ("start", "override", "refused"),
     [
         ([HEATING], "physics.heating.energy=2.0", False),
+        (GRAVITY, "physics.gravity.G=2.0", False),
+        (GRAVITY[:1], GRAVITY[1], True),
         ([RANGE], "physics.alpha.max=1.0", False),
         ([RANGE], "physics.alpha=1.0", True),
     ],

@@ -19,6 +19,7 @@ from sph.neighbours.search import Origin, Search
 from sph.parts.gravity import FOLDER, Gravity
 from sph.parts.gravity._zeta import find_zeta
 from sph.passes import Neighbours
+from sph.scene import Scene
 from sph.simulation import Simulation
 from sph.threads import Team
 
@@ -298,11 +299,15 @@ def test_run_conserves_energy_and_restarts_with_same_bits(simulate):
     again.close()
 
 
-def test_restart_of_run_without_gravity_has_no_such_part(simulate):
-    config = configuration.from_text(TEXT.replace("[physics.gravity]", ""))
-    simulation = simulate(config)
-    assert simulation.particles.get("potential") is None
-    assert all(one.name != "gravity" for one in simulation.scene.parts)
+def test_scene_has_gravity_only_if_given():
+    scene = Scene(configuration.from_text(TEXT))
+    assert "self-gravity" in scene.described()[0]
+    assert {"potential", "zeta"} <= {field.name for field in scene.fields}
+    scene = Scene(configuration.from_text(TEXT).override(["physics.gravity.softening=0.1"]))
+    assert "zeta" not in {field.name for field in scene.fields}
+    scene = Scene(configuration.from_text(TEXT.replace("[physics.gravity]", "")))
+    assert "self-gravity: physics.gravity is not given" in scene.described()[1]
+    assert not {"potential", "zeta"} & {field.name for field in scene.fields}
 
 
 @pytest.mark.parametrize(

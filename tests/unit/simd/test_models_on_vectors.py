@@ -51,8 +51,10 @@ def verbs_of(model, lanes):
 
 def test_models_have_every_verb():
     found = {name for model in MODELS for name in verbs_of(model, simd.SCALAR)}
-    # tests in this process may have verbs of their own
-    assert found == {name for name, one in VERBS.items() if one.__module__.startswith("sph.")}
+    # tests in this process may have verbs of their own; those of gravity take tuples of vectors,
+    # and are tested with its forces
+    own = {name: one for name, one in VERBS.items() if one.__module__.startswith("sph.")}
+    assert found == {name for name, one in own.items() if one.__module__ != "sph.parts.gravity"}
 
 
 def label(model):
