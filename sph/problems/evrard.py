@@ -246,20 +246,24 @@ def _steepest(radius: np.ndarray, speed: np.ndarray, density: np.ndarray) -> flo
     """Return the radius where the radial velocity of particles (N,) falls most steeply.
 
     The slope is that of the straight line through the particles within WINDOW of a radius, weighted
-    so that equal lengths along the radius count alike.
+    so that equal lengths along the radius count alike. NaN with too few particles.
     """
     order = np.argsort(radius)
     r, v = radius[order], speed[order]
     w = 1.0 / (density[order] * r * r)
     inner, outer = (float(np.quantile(r, share)) for share in INNER_AND_OUTER)
     at = np.geomspace(inner, outer, RADII)
-    low, high = np.searchsorted(r, (1.0 - WINDOW) * at), np.searchsorted(r, (1.0 + WINDOW) * at)
+    low, high = np.searchsorted(r, np.outer((1.0 - WINDOW, 1.0 + WINDOW), at))
+    enough = high - low >= FEWEST
+    if not enough.any():
+        return float("nan")
+    at, low, high = at[enough], low[enough], high[enough]
     sums = (
         np.concatenate([[0.0], np.cumsum(one)]) for one in (w, w * r, w * v, w * r * r, w * r * v)
     )
     n, x, y, xx, xy = (one[high] - one[low] for one in sums)
     slope = (xy - x * y / n) / (xx - x * x / n)
-    return float(at[np.argmin(np.where(high - low < FEWEST, 0.0, slope))])
+    return float(at[np.argmin(slope)])
 
 
 def _compared(name: str, found: float, expected: float) -> dict[str, float]:

@@ -114,6 +114,13 @@ def test_reference_is_left_out_for_gas_that_collapses_too_far():
         assert soft.problem.error_region(there, time, x)[1] == "the whole domain"
 
 
+def test_theory_ends_with_reference(monkeypatch):
+    monkeypatch.setattr(evrard, "LAST_TIME", 0.5)
+    theory = problem().theory(MONATOMIC, np.array([0.0, 0.4, 0.6]))
+    for energies in theory.values():
+        assert np.isfinite(energies).tolist() == [True, True, False]
+
+
 # --- figures ----------------------------------------------------------------------------------
 
 
@@ -127,6 +134,11 @@ def test_shock_radius_of_particles_on_reference_is_that_of_reference(time):
     # slopes over 10 % of the radius to either side; 0.012, 0.004 and 0.003 were measured
     assert found["shock_radius_error"] < 0.02
     assert found["half_mass_radius_error"] < 1e-3
+
+
+def test_shock_radius_of_few_particles_is_missing():
+    shells, _ = evrard.solve(MONATOMIC.gamma, 0.05, 0.77)
+    assert np.isnan(problem().compare(MONATOMIC, 0.77, ideal(shells, 10), None)["shock_radius"])
 
 
 @pytest.mark.parametrize("time", [0.0, 0.39, 1.56, 3.0])
