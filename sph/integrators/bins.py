@@ -12,6 +12,7 @@ from numba.extending import register_jitable
 
 from sph.compiled import COMPILED
 from sph.integrators.step_size import SUPPORT_CHANGE
+from sph.neighbours.order import BLOCK
 from sph.part import Pass
 from sph.state import Field, Public
 
@@ -67,11 +68,14 @@ def power_of_two(x: float) -> float:
 def begin_all(first, last, per_tick, time_step, begin, end):
     """Begin a step for each particle. Return the shortest step, in ticks, and the sum of 1/step."""
     shortest, rates = np.inf, 0.0
-    for i in range(first, last):
-        length = min(power_of_two(max(time_step[i] * per_tick, 0.5)), TICKS)
-        begin[i], end[i] = 0.0, length
+    for k in range(first, last, BLOCK):
+        length = TICKS
+        for i in range(k, min(k + BLOCK, last)):
+            length = min(length, power_of_two(max(time_step[i] * per_tick, 0.5)))
+        for i in range(k, min(k + BLOCK, last)):
+            begin[i], end[i] = 0.0, length
+            rates += 1.0 / length
         shortest = min(shortest, length)
-        rates += 1.0 / length
     return shortest, rates
 
 
@@ -153,15 +157,23 @@ def lengths(first, last, tick, time_step, active, begin, end, length):
 
 @njit(**COMPILED)
 def begin_next(first, last, now, tick, length, allowed, active, time_step, begin, end):
-    """Begin the next steps of active particles, and end the steps of others early if necessary."""
-    for i in range(first, last):
-        if active[i] > 0.0:
-            if allowed[i] < length[i]:
-                time_step[i] = allowed[i] * tick
-            step = min(power_of_two(max(min(length[i], allowed[i]), 1.0)), TICKS)
-            while math.floor(now / step) * step != now:  # steps begin at multiples of their length
-                step *= 0.5
-            begin[i], end[i] = now, now + step
-        elif allowed[i] < length[i]:
-            step = power_of_two(max(allowed[i], 1.0))
-            end[i] = min(end[i], (math.floor(now / step) + 1.0) * step)
+    """Begin the next steps of active particles, and end the steps of others early if necessary.
+
+    Active particles of a block begin equal steps, so that later whole blocks are active together:
+    a pass over a block takes almost as long for one particle as for all. `first` begins a block.
+    """
+    for k in range(first, last, BLOCK):
+        shortest = TICKS
+        for i in range(k, min(k + BLOCK, last)):
+            if active[i] > 0.0:
+                shortest = min(shortest, power_of_two(max(min(length[i], allowed[i]), 1.0)))
+        while math.floor(now / shortest) * shortest != now:  # steps begin at their multiples
+            shortest *= 0.5
+        for i in range(k, min(k + BLOCK, last)):
+            if active[i] > 0.0:
+                if allowed[i] < length[i]:
+                    time_step[i] = allowed[i] * tick
+                begin[i], end[i] = now, now + shortest
+            elif allowed[i] < length[i]:
+                step = power_of_two(max(allowed[i], 1.0))
+                end[i] = min(end[i], (math.floor(now / step) + 1.0) * step)

@@ -1,8 +1,8 @@
 """Limit on the time steps of neighbours, with individual steps.
 
-By Saitoh & Makino (2009), ApJ 697, L99: no particle may have a step more than RATIO times that of a
-neighbour. Otherwise fast gas could reach a particle with a long step, and pass it, before the
-particle feels any force.
+By Saitoh & Makino (2009), ApJ 697, L99: no particle may have a step more than RATIO times the one
+that the state of a neighbour allows. Otherwise fast gas could reach a particle with a long step,
+and pass it, before the particle feels any force.
 """
 
 from typing import NamedTuple

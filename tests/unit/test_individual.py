@@ -126,15 +126,13 @@ def test_neighbours_keep_ratio_of_steps():
         x -= np.round(x)  # periodic, side 1
         reach = np.maximum(p.support[:, None], p.support[None, :])
         near = ((x**2).sum(axis=0) < reach**2) & (p.active > 0.0)[:, None]
-        # the particle's step that begins, and what remains of that of its neighbours
-        own, rest = p.step_end - p.step_begin, p.step_end - now
-        worst = max(worst, (rest[None, :] / own[:, None] * near).max())
+        # the step that the particle's state allows, and what remains of the steps of neighbours
+        worst = max(worst, ((p.step_end - now)[None, :] / each._length[:, None] * near).max())
 
     each._begin_steps = check
     one.advance(0.004)
     assert one.individual.shortest < one.particles.time_step.max() / 20  # it had work to do
-    # a step is at most RATIO times that of a neighbour; both are rounded to powers of two
-    assert 2.0 < worst <= 2 * limiter.RATIO
+    assert 0.5 * limiter.RATIO < worst <= limiter.RATIO
 
 
 def test_explosion_without_limiter_breaks_and_is_caught(monkeypatch):
@@ -195,3 +193,14 @@ def test_nan_in_a_tick_is_named(monkeypatch):
     one.particles.energy_rate[5] = np.nan
     with pytest.raises(NumericalError, match=r"particle \d+ at .* is nan|is not finite"):
         one.advance(0.02)
+
+
+def test_active_particles_of_a_block_begin_equal_steps():
+    length, allowed = np.full(10, 64.0), np.full(10, np.inf)
+    length[2], allowed[5], length[9] = 17.0, 40.0, 3.0
+    active = np.ones(10)
+    active[7] = 0.0
+    begin, end, time_step = np.zeros(10), np.full(10, 512.0), np.ones(10)
+    bins.begin_next(0, 10, 512.0, 1.0, length, allowed, active, time_step, begin, end)
+    # 16 is the power of two below 17; the second block has the last two particles
+    assert end.tolist() == [528.0] * 7 + [512.0] + [514.0] * 2

@@ -206,12 +206,12 @@ def sets():
 SETS = sets()
 
 
-def of_set(name, neighbours=80):
+def of_set(name):
     """Engine, and the exact acceleration and potential by the same loops without nodes."""
     position = SETS[name]
     mass = np.full(position.shape[1], 1.0 / position.shape[1])
     distance = np.sqrt(((position[:, :, None] - position[:, None, :]) ** 2).sum(axis=0))
-    engine = Engine(position, mass, np.partition(distance, neighbours, axis=1)[:, neighbours])
+    engine = Engine(position, mass, np.partition(distance, 80, axis=1)[:, 80])
     return engine, *engine.attraction(opening_angle=DIRECT)
 
 
@@ -226,16 +226,39 @@ def test_default_settings_are_accurate(name):
     assert np.median(abs(depth / potential - 1)) < 5e-5  # 2e-5 measured
 
 
+def two_clumps(distance, support):
+    """Two clumps of radius 1 or less whose centres are `distance` apart, and their supports."""
+    random = np.random.default_rng(7)
+    position = random.uniform(-0.5, 0.5, (3, 128))
+    position[:, 64:] += distance * np.array([[0.6], [0.48], [0.64]])
+    return Engine(position, random.uniform(0.5, 2.0, 128), support)
+
+
 @pytest.mark.parametrize(("order", "power"), [("monopole", 2), ("quadrupole", 3), ("octupole", 4)])
-def test_error_falls_with_opening_angle(order, power):
-    """The first moment left out has the power `power` of the angle."""
-    engine, acceleration, _ = of_set("uniform", neighbours=10)  # else few groups are far
-    errors = [
-        np.median(relative(engine.attraction(order=order, opening_angle=angle)[0], acceleration))
-        for angle in (0.5, 0.2)
-    ]
-    # 2.4, 3.7 and 4.5 measured: smaller angles also leave fewer groups
-    assert np.log(errors[0] / errors[1]) / np.log(2.5) > power
+def test_error_of_a_node_is_that_of_first_moment_left_out(order, power):
+    """The relative error of the force falls with that power of the distance."""
+    errors = []
+    for distance in (20.0, 40.0):
+        engine = two_clumps(distance, np.full(128, 0.3))
+        exact, _ = engine.attraction(opening_angle=DIRECT)
+        found, _ = engine.attraction(order=order, opening_angle=0.1)
+        assert not np.allclose(found, exact, rtol=0, atol=1e-13)  # a clump acts as a node
+        # the mean removes what differs by particle, and a force within the clump has no error
+        errors.append(np.sqrt(((found - exact) ** 2).mean()) * distance**2)
+    assert np.log2(errors[0] / errors[1]) == pytest.approx(power, abs=0.25)
+
+
+@pytest.mark.parametrize("wide", ["near", "far", "both"])
+def test_nodes_within_a_support_are_opened(wide):
+    support = np.full(128, 0.3)
+    support[:64] = 25.0 if wide != "far" else 0.3
+    support[64:] = 25.0 if wide != "near" else 0.3
+    engine = two_clumps(20.0, support)
+    exact, depth = engine.attraction(opening_angle=DIRECT)
+    found, potential = engine.attraction(order="monopole", opening_angle=0.9)
+    far = found[:, 64:], exact[:, 64:]  # round-off of sums in another order
+    assert far[0] == pytest.approx(far[1], abs=1e-12 * abs(far[1]).max())
+    assert potential == pytest.approx(depth, rel=1e-12)
 
 
 def test_fixed_softening_is_newtons_force_beyond_it():
