@@ -22,6 +22,8 @@ TICKS = 2.0**40  # of a long step: exact in floating point
 # longer cost little if they are computed once in so many shortest steps.
 DEPTH = 128.0
 
+ROUNDING = 1.0 + 1e-9
+
 LONGER = 2.0  # largest ratio of a step to the last step of the particle
 
 PREDICTION = 0.6  # largest |div v| dt for which the change of a density is predicted
@@ -57,8 +59,11 @@ def fields(of_parts: tuple[Field, ...], passes: tuple[Pass, ...]) -> tuple[Field
 
 @register_jitable
 def power_of_two(x: float) -> float:
-    """Return the largest power of two up to x > 0."""
-    return math.ldexp(1.0, math.frexp(x)[1] - 1)
+    """Return the largest power of two up to x > 0, but for rounding.
+
+    A step that may be twice as long as the last one must not remain as it is for a rounding error.
+    """
+    return math.ldexp(1.0, math.frexp(x * ROUNDING)[1] - 1)
 
 
 # Each function below considers particles [first, last); arrays are (N,).

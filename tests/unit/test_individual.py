@@ -155,6 +155,14 @@ def test_results_are_close_to_those_of_global_steps(text):
     assert difference < 0.01 * spread
 
 
+def test_longest_step_is_the_whole_long_step_whatever_the_rounding():
+    """Otherwise it would be half as long, and could never become longer."""
+    for length in np.random.default_rng(1).uniform(0.001, 1.0, 1000):
+        begin, end = np.empty(1), np.empty(1)
+        bins.begin_all(0, 1, TICKS / length, np.array([length]), begin, end)
+        assert end[0] == TICKS
+
+
 def test_energy_error_falls_with_courant_number():
     drifts = [abs(run(BLAST, EACH, f"physics.C={C}").energy_drift) for C in (0.15, 0.0375)]
     # pairs are not exchanged symmetrically, so the error is that of the time steps
@@ -162,7 +170,7 @@ def test_energy_error_falls_with_courant_number():
 
 
 @pytest.mark.parametrize(
-    ("length", "expected"), [(1.0, 1.0), (1.999, 1.0), (2.0, 2.0), (3.7e5, 2.0**18), (0.3, 0.25)]
+    ("length", "expected"), [(1.0, 1.0), (1.999, 1.0), (2.0, 2.0), (2.0 - 1e-15, 2.0), (3.7e5, 2.0**18), (0.3, 0.25)]
 )
 def test_steps_are_powers_of_two(length, expected):
     assert bins.power_of_two(length) == expected
