@@ -86,6 +86,15 @@ def test_expansion_without_gravity_matches_exact_ball():
     assert np.all(energies.gravitational == 0.0)
 
 
+def test_surface_begins_to_expand_as_weak_rarefaction():
+    faces, time = np.linspace(0.0, 1.0, 11), 1e-6
+    uniform = Cells(faces, np.full(10, 2.0), np.zeros(10), np.full(10, 1.2))
+    cells, _ = sphere.evolve(uniform, GAMMA, time, G=0.0)
+    # P/(rho c) with c = 1; one step, in which the sound wave crosses 1e-5 of a cell
+    assert (cells.faces[-1] - 1.0) / time == pytest.approx(0.6, rel=1e-4)
+    assert np.all(cells.velocity[:-1] == 0.0)
+
+
 def test_polytrope_stays_at_rest():
     # n = 1 with G = M = R = 1: density sinc(pi r) pi/4, P = (2/pi) rho^2
     n = 200
