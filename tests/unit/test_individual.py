@@ -170,7 +170,8 @@ def test_energy_error_falls_with_courant_number():
 
 
 @pytest.mark.parametrize(
-    ("length", "expected"), [(1.0, 1.0), (1.999, 1.0), (2.0, 2.0), (2.0 - 1e-15, 2.0), (3.7e5, 2.0**18), (0.3, 0.25)]
+    ("length", "expected"),
+    [(1.0, 1.0), (1.999, 1.0), (2.0, 2.0), (2.0 - 1e-15, 2.0), (3.7e5, 2.0**18), (0.3, 0.25)],
 )
 def test_steps_are_powers_of_two(length, expected):
     assert bins.power_of_two(length) == expected
