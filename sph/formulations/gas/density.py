@@ -128,8 +128,7 @@ def density(
                     number += 1
             for attempt in range(2):
                 farthest = 0.0
-                for index in range(number):
-                    i = members[index]
+                for i in range(i_first, i_last):
                     farthest = max(farthest, _reach(attempt, support_before, neighbours, i))
                 farthest *= per_length
                 blocks = near_blocks(lanes, dim, boxes, listed, low, high, farthest, chosen)
