@@ -16,7 +16,7 @@ DRIFT = 1e-3
 # single precision round-off added up to 3e-7 in 1000 steps of 256 particles (configs/moving_box).
 MOMENTUM = {"double": 1e-6, "single": 1e-4}
 # Where forces of pairs are not equal and opposite to round-off: individual steps change momentum by
-# 1e-6 to 1e-5 (point explosion), a tree code by about as much.
+# 1e-6 (point explosion) to 5e-5 (blob), a tree code by 1e-5 (Evrard's collapse).
 MOMENTUM_INEXACT = 1e-3
 # In shipped configurations sum m/rho is within 5 % of the box's volume, in most within 3 %. With
 # too few neighbours (eta = 0.85 in 2-D) it is wrong by 12 %.
