@@ -158,11 +158,9 @@ def table(formulation: str) -> type[Physics]:
     declarations.check_keys(kinds, dir(Physics) + list(Physics.model_fields), CLASSES)
     fields = {key.name: _field(key) for kind in kinds for key in kind.keys}
     for name, default in kinds[0].defaults.items():
-        given = Physics.model_fields[name]
-        fields[name] = (
-            given.rebuild_annotation(),
-            FieldInfo.merge_field_infos(given, default=default),
-        )
+        shared = Physics.model_fields[name]
+        own = FieldInfo.merge_field_infos(shared, default=default)
+        fields[name] = (shared.rebuild_annotation(), own)
     found = create_model("Physics", __base__=Physics, __doc__=Physics.__doc__, **fields)
     found.kinds = kinds
     return found

@@ -163,7 +163,7 @@ class Problem(base.Problem):
         velocity[0] = state.velocity
         energy = eos.internal_energy(state.density, state.pressure)
         mass = np.repeat(masses, [stack.shape[1] for stack in stacks])
-        density = {"density": state.density}
+        density: Any = {"density": state.density}
         return base.InitialState(position, velocity, mass, energy, density)
 
     def exact(self, eos, time: float, position: np.ndarray) -> dict[str, np.ndarray] | None:

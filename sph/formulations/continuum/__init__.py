@@ -1,4 +1,4 @@
-"""Fluids and solids by SPH of the continuum equations: evolved density, corrected kernel, stress."""
+"""Fluids and solids by SPH of the continuum equations: evolved density, corrected kernel."""
 
 from typing import Any, Literal, NamedTuple
 
@@ -8,7 +8,7 @@ from sph import faults
 from sph.formulations import Formulation
 from sph.formulations.continuum.clamps import hold
 from sph.formulations.continuum.gradients import gradients
-from sph.formulations.continuum.material import Material, shear_modulus, stresses, yielded
+from sph.formulations.continuum.material import Material, stresses, yielded
 from sph.formulations.continuum.rates import rates
 from sph.formulations.continuum.rotation import JAUMANN
 from sph.formulations.continuum.support import supports

@@ -48,9 +48,8 @@ def stresses(
     i_end = min(lists.first[last] * BLOCK, density.size)
     axes = empty((2, 3, 3), np.float64)  # scratch
     for i in range(lists.first[first] * BLOCK, i_end):
-        if number is not None:
-            if number[i] != models.number:
-                continue
+        if number is not None and number[i] != models.number:
+            continue
         rho, u = density[i], energy[i]
         P = pressure_of(eos, rho, u)
         c = sound_speed_of(eos, rho, P)
@@ -94,9 +93,8 @@ def yielded(
     lists = neighbours.lists
     i_end = min(lists.first[last] * BLOCK, energy.size)
     for i in range(lists.first[first] * BLOCK, i_end):
-        if number is not None:
-            if number[i] != models.number:
-                continue
+        if number is not None and number[i] != models.number:
+            continue
         _return(
             models.strength, dim, stress, velocity_gradient, div_v, plastic_strain, energy[i], i,
             True,
