@@ -63,6 +63,17 @@ def under_physics(found: dict[str, Section]) -> list[Issue]:
     return []
 
 
+def steps_issues(found: dict[str, Section]) -> list[Issue]:
+    """Return an issue if the formulation has no individual time steps, which the user wants."""
+    if not {"time", "physics"} <= found.keys() or found["time"].stepping == "global":
+        return []
+    if found["physics"].kinds[0].individual_steps:
+        return []
+    name = value_text(found["physics"].formulation)
+    text = f'= "individual": expected "global" for physics.formulation = {name}'
+    return [Issue(("time", "stepping"), text)]
+
+
 def pairing_issues(found: dict[str, Section]) -> list[Issue]:
     """Return an issue if particles pair with this kernel at this eta, unless pairing is allowed."""
     if not {"problem", "physics"} <= found.keys() or found["physics"].allow_pairing:

@@ -79,6 +79,7 @@ class Gas(Formulation):
         ),
     )
     neighbours_key = "physics.eta"
+    individual_steps = True
     roles = ("viscosity", "balsara", "exchange")
     reserves = ("pressure", "energy_shift", "div_v", "curl_v")
     evolved = (Evolved("internal_energy", "energy_rate", "predicted_energy", POSITIVE),)
@@ -120,6 +121,8 @@ class Gas(Formulation):
 
     @classmethod
     def issues(cls, physics, problem):
+        if physics.materials:
+            return [("materials", 'expected physics.formulation = "continuum"')]
         scheme = registry.model(SCHEMES, physics.scheme)
         eos = physics.eos_model()
         if eos.under_tension:
