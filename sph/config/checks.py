@@ -76,11 +76,12 @@ def steps_issues(found: dict[str, Section]) -> list[Issue]:
 
 def pairing_issues(found: dict[str, Section]) -> list[Issue]:
     """Return an issue if particles pair with this kernel at this eta, unless pairing is allowed."""
-    if not {"problem", "physics"} <= found.keys() or found["physics"].allow_pairing:
+    if not {"problem", "physics"} <= found.keys():
         return []
     physics, dimension = found["physics"], found["problem"].dimension
-    if "eta" not in type(physics).model_fields:
-        return []  # the limits of kernels were measured for gas; the summary reports pairs
+    # the limits of kernels were measured for gas; for other matter the summary reports pairs
+    if "eta" not in type(physics).model_fields or physics.allow_pairing:
+        return []
     limit = physics.kernel_model().pairs_above.get(dimension, math.inf)
     if physics.eta <= limit:
         return []

@@ -54,6 +54,13 @@ class Gas(Formulation):
             above=0.0,
         ),
         Key(
+            "allow_pairing",
+            "allow a spline kernel at values of eta for which its particles form close pairs (the "
+            "pairing instability)",
+            kind=bool,
+            default=False,
+        ),
+        Key(
             "scheme",
             "pair force: how a pair of neighbours accelerate each other and exchange energy; "
             "`sph list` describes each",

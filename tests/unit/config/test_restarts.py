@@ -57,7 +57,6 @@ CONTINUUM_RECORDED = ["physics.spacing_ratio=1.5", "physics.q_a=1.0", "physics.q
 CONTINUUM_REFUSED = [
     "physics.correction=1",
     'physics.strength={ name = "elastic", shear_modulus = 2.0 }',
-    f"physics.materials.water.{WATER.removeprefix('physics.')}",
 ]
 
 
