@@ -152,7 +152,8 @@ class Continuum(Formulation):
         self.evolved = self._evolved()
         self.passes = self._passes()
         self.columns = ("corrections_failed",) if self.order == 1 else ()
-        self.idle = () if self.order == 1 else ("sums",)
+        # `check` only names the particle: a NaN is in the sums of the step, which are always checked
+        self.idle = ("check",) if self.order == 1 else ("check", "sums")
 
     @classmethod
     def of(cls, scene):
