@@ -273,9 +273,10 @@ def tensile_stress(scene, stress):
     return np.einsum("nak,nk,nbk->abn", axes, pulled, axes)
 
 
-def tensile_weight(scene, pairs, matter, k):
-    """(P,) F = (W d_0^D / w(spacing/d_0))^4 of the particles k, d_0 their initial d."""
-    d_0 = scene.lengths(matter.mass, matter.rest_density)[k]
+def tensile_weight(scene, pairs, matter):
+    """(P,) F = (W d_0^D / w(spacing/d_0))^4, d_0 the mean of the initial d of the pair."""
+    initial = scene.lengths(matter.mass, matter.rest_density)
+    d_0 = 0.5 * (initial[pairs.near.i] + initial[pairs.near.j])
     at_spacing = scene.kernel_at(d_0 / scene.spacing_ratio, 2 * d_0)[0]
     return (pairs.kernel / at_spacing) ** 4
 
@@ -288,12 +289,10 @@ def forces(scene, pairs, slopes, matter, volume, state):
     own_size, other_size = norm(own), norm(other)
     if scene.tensile > 0:
         R = tensile_stress(scene, matter.stress)
-        F_i, F_j = (tensile_weight(scene, pairs, matter, k) for k in (i, j))
-        own, other = own + F_i * R[:, :, i], other + F_j * pairs.tensor_of_image(R)
-        own_size, other_size = (
-            (1 + scene.tensile * F_i) * own_size,
-            (1 + scene.tensile * F_j) * other_size,
-        )
+        F = tensile_weight(scene, pairs, matter)
+        own, other = own + F * R[:, :, i], other + F * pairs.tensor_of_image(R)
+        own_size = (1 + scene.tensile * F) * own_size
+        other_size = (1 + scene.tensile * F) * other_size
     V_iV_j, m_im_j = volume[i] * volume[j], matter.mass[i] * matter.mass[j]
     own_force = V_iV_j * apply(own, slopes.own)
     other_force = V_iV_j * apply(other, slopes.other)

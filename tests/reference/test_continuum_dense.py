@@ -266,7 +266,7 @@ def test_two_particles_match_by_hand(order):
     mu = mu_0 * f.mean()
     assert mu < 0
     pi = (-1.0 * 1.5 * mu + 2.0 * mu**2) / 1.25
-    d_0 = 1.2 * m / np.array([1.1, 1.5])
+    d_0 = (1.2 * m / np.array([1.1, 1.5])).mean()
     q_0 = 1 / 1.2
     F = (W * d_0 / (2 / 3 * (1 - 1.5 * q_0**2 + 0.75 * q_0**3))) ** 4
     pulled = sigma - eps * F * np.maximum(sigma, 0)
