@@ -192,9 +192,9 @@ def scattered(box, count, random, beyond):
     centre = low + 0.2 * (high - low)
     position = centre + radius * np.where(towards < 0, centre - low, high - centre) * towards
     position += beyond * np.sign(towards) * radius
-    if d > 1:
-        position[:, 4] = position[:, 3]  # two in one place
-    position[0, 5] = low[0, 0]  # where a mirror puts the image too
+    if d > 1:  # in 1-D two in one place would alone have more mass than a support is to hold
+        position[:, 4] = position[:, 3]
+        position[0, 5] = low[0, 0]  # where a mirror puts the image too
     return position
 
 
@@ -345,7 +345,7 @@ def scene_of(case, given, end):
     if len(case.materials) > 1:
         laws = {"materials": {f"m{k}": one for k, one in enumerate(case.materials)}}
     settings = physics.table("continuum")(
-        **laws, kernel=case.kernel, spacing_ratio=case.spacing_ratio, correction=case.order,
+        formulation="continuum", **laws, kernel=case.kernel, spacing_ratio=case.spacing_ratio, correction=case.order,
         q_a=1.7, q_b=0.8, balsara=case.balsara, tensile_correction=case.tensile,
         allow_pairing=True,
     )  # fmt: skip
