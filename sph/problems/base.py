@@ -1,10 +1,12 @@
 """Base class of all problems: the shared keys, and the methods that the program calls."""
 
 import math
+from collections.abc import Iterable, Mapping
 from typing import Any, ClassVar, Literal, NamedTuple
 
 import numpy as np
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field
+from pydantic_core import PydanticCustomError
 
 Boundary = Literal["periodic", "mirror", "open"]
 
@@ -16,6 +18,9 @@ class InitialState(NamedTuple):
     velocity: np.ndarray  # (D, N)
     mass: np.ndarray  # (N,)
     internal_energy: np.ndarray  # (N,) per unit mass
+    # initial values (N,) of further fields, e.g. "density"; those that the formulation does not
+    # have are ignored
+    others: Mapping[str, np.ndarray] = {}
 
 
 class Limit(NamedTuple):
@@ -31,6 +36,20 @@ class Limit(NamedTuple):
     def holds(self, value: float) -> bool:
         """Return whether `value` is within the limit; False for NaN."""
         return value >= self.bound if self.at_least else value <= self.bound
+
+
+class Fault(NamedTuple):
+    """An error in a key of [problem]: its path there, e.g. ("body", 2, "material"), and the text
+    that follows the key's name in the message.
+    """
+
+    path: tuple[str | int, ...]
+    text: str
+
+
+def refused(faults: Iterable[Fault]) -> PydanticCustomError:
+    """Return an error to raise in a validator, or in `Problem.under`, that names several keys."""
+    return PydanticCustomError("issues", "{issues}", {"issues": list(faults)})
 
 
 class Section(BaseModel):
@@ -106,7 +125,8 @@ class Problem(Section):
         """Return the problem with what it takes from [physics], such as the constant G of gravity.
 
         The configuration calls this once. Raises ValueError, with a message that begins with a key
-        of [physics], if the problem cannot be set up under these physics.
+        of [physics], if the problem cannot be set up under these physics, or `refused` if keys of
+        [problem] do not match them.
         """
         return self
 
