@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Iterable, Mapping
+from types import MappingProxyType
 from typing import Any, ClassVar, Literal, NamedTuple
 
 import numpy as np
@@ -18,9 +19,9 @@ class InitialState(NamedTuple):
     velocity: np.ndarray  # (D, N)
     mass: np.ndarray  # (N,)
     internal_energy: np.ndarray  # (N,) per unit mass
-    # initial values (N,) of further fields, e.g. "density"; those that the formulation does not
-    # have are ignored
-    others: Mapping[str, np.ndarray] = {}
+    # initial values of further fields, (N,) each, such as the density; ignored where a scene has no
+    # field of that name
+    others: Mapping[str, np.ndarray] = MappingProxyType({})
 
 
 class Limit(NamedTuple):
@@ -129,6 +130,11 @@ class Problem(Section):
         [problem] do not match them.
         """
         return self
+
+    @property
+    def clamps(self) -> bool:
+        """Whether some particles are clamped (field "clamped" of the initial state)."""
+        return False
 
     def fills_box(self, eos) -> bool:
         """Return whether gas fills the box at all times, so that sum m/rho equals its volume."""

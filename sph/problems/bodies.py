@@ -264,6 +264,10 @@ class Problem(base.Problem):
         )
         return float((volume / self.n) ** (1.0 / self.dimension))
 
+    @property
+    def clamps(self) -> bool:
+        return any(body.clamped for body in self.body)
+
     def fills_box(self, eos) -> bool:
         """Return False: there is vacuum around the bodies."""
         return False
@@ -273,14 +277,11 @@ class Problem(base.Problem):
 
         Raises `base.refused` for a body whose material is unknown or whose density is not given.
         """
-        tables = getattr(physics, "materials", None)
-        if tables is None:
-            models = {"": physics.eos_model()}
-        else:
-            models = {name: eos for name, (eos, _) in physics.materials_models().items()}
+        models = {name: eos for name, (eos, _) in physics.materials_models().items()}
+        named = physics.materials is not None
         faults, matter = [], []
         for i, body in enumerate(self.body):
-            found = _matter(body, models, named=tables is not None)
+            found = _matter(body, models, named)
             if isinstance(found, Fault):
                 faults.append(Fault(("body", i, *found.path), found.text))
             else:
@@ -304,7 +305,7 @@ class Problem(base.Problem):
         others = {"density": density}
         if self._materials > 1:
             others["material"] = each([one.material for one in matter])
-        if any(body.clamped for body in self.body):
+        if self.clamps:
             others["clamped"] = each([body.clamped for body in self.body])
         return base.InitialState(
             np.hstack([one.position for one in placed]),
