@@ -93,6 +93,16 @@ class Scene:
         return tuple(sorted(found, key=lambda one: STAGES.index(one.stage)))
 
     @cached_property
+    def rate_passes(self) -> tuple[Pass, ...]:
+        """The passes between prediction and correction."""
+        return tuple(one for one in self.passes if one.stage != STAGES[-1])
+
+    @cached_property
+    def last_passes(self) -> tuple[Pass, ...]:
+        """The passes after the correction."""
+        return tuple(one for one in self.passes if one.stage == STAGES[-1])
+
+    @cached_property
     def keeps_momentum(self) -> np.ndarray:
         """(D,) 1.0 for axes along which momentum is conserved (no wall, no field), else 0.0."""
         kept = all(part.keeps_momentum for part in self.all_parts)
