@@ -140,6 +140,10 @@ class Problem(base.Problem):
         moving = self.tip_velocity * (1.0 - clamped)
         return moving * np.array([-y * slope / self.length, deflection])
 
+    @property
+    def clamps(self) -> bool:
+        return True
+
     def fills_box(self, eos) -> bool:
         return False
 

@@ -32,7 +32,7 @@ def state_of(position, material=None, support=SUPPORT):
 def started(*args, domain=OPEN, is_solid=None, **keys):
     state = state_of(*args, **keys)
     solid = np.ones(state.number, dtype=bool) if is_solid is None else is_solid
-    pieces.start(state, domain, solid)
+    pieces.start(state, state.support, domain, solid)
     return state
 
 
@@ -100,7 +100,7 @@ def test_materials_in_contact_are_bodies_and_fluids_are_none():
 def test_bodies_of_the_problem_remain():
     state = state_of(bar(10))
     state.body[:] = np.repeat([2.0, 1.0], 20)
-    pieces.start(state, OPEN, np.ones(40, dtype=bool))
+    pieces.start(state, state.support, OPEN, np.ones(40, dtype=bool))
     assert state.body.tolist() == [2.0] * 20 + [1.0] * 20
 
 

@@ -38,11 +38,11 @@ class Pieces(NamedTuple):
     particle: int  # ID of a particle of the smallest piece of the first torn body, or 0
 
 
-def start(state, domain: Domain, is_solid: np.ndarray) -> None:
+def start(state, support: np.ndarray, domain: Domain, is_solid: np.ndarray) -> None:
     """Number the solid bodies from 1 in `state.body`; a number that the problem gave remains.
 
-    A body is a connected piece of one material. is_solid: (N,), whether a particle's material has a
-    strength; the body of other particles is 0.
+    A body is a connected piece of one material. support: (N,) support radii; is_solid: (N,),
+    whether a particle's material has a strength; the body of other particles is 0.
     """
     if state.body.any():
         state.body[~is_solid] = 0.0
@@ -52,7 +52,7 @@ def start(state, domain: Domain, is_solid: np.ndarray) -> None:
     number = 0
     for kind in np.unique(kinds[is_solid]):
         members = np.flatnonzero(is_solid & (kinds == kind))
-        count, label = _connected(state.position, state.support, members, domain)
+        count, label = _connected(state.position, support, members, domain)
         state.body[members] = number + 1 + label
         number += count
 
