@@ -302,7 +302,7 @@ class Problem(base.Problem):
 
         still = [0.0] * self.dimension
         density = each([one.density for one in matter])
-        others = {"density": density}
+        others = {"density": density, "body": each(np.arange(1.0, len(placed) + 1.0))}
         if self._materials > 1:
             others["material"] = each([one.material for one in matter])
         if self.clamps:
@@ -317,7 +317,7 @@ class Problem(base.Problem):
 
     def report(self, eos, time: float, particles, pressure) -> dict[str, float]:
         """Return the velocity of the centre of mass of each body, as body_0_velocity_x."""
-        owner = self.owner(particles.id)
+        owner = self._owner(particles.id)
         found = {}
         for i in range(len(self.body)):
             mine = owner == i
@@ -326,7 +326,7 @@ class Problem(base.Problem):
                 found[f"body_{i}_velocity_{'xyz'[axis]}"] = float(component)
         return found
 
-    def owner(self, ids: np.ndarray) -> np.ndarray:
+    def _owner(self, ids: np.ndarray) -> np.ndarray:
         """Return the index of the body (N,) of particles with these IDs."""
         ends = np.cumsum([one.position.shape[1] for one in self.placed])
         return np.searchsorted(ends, ids, side="left")

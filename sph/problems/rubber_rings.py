@@ -13,7 +13,7 @@ import numpy as np
 from pydantic import Field, PrivateAttr, model_validator
 
 from sph.problems import base
-from sph.problems.support import bodies
+from sph.problems.support import bodies, solids
 
 _SHARED = base.Problem.model_fields
 
@@ -79,9 +79,9 @@ class Problem(base.Problem):
 
     def under(self, physics):
         """Return the problem with the speed of the rings; ValueError unless they are of a solid."""
-        bodies.check_solid(physics)
+        eos, _ = solids.required(physics)
         found = self.model_copy()
-        found._speed = self.mach * physics.eos_model().c_0
+        found._speed = self.mach * eos.c_0
         return found
 
     def fills_box(self, eos) -> bool:
@@ -107,16 +107,17 @@ class Problem(base.Problem):
         position, velocity, mass = bodies.of_one_material(
             self._placed, [[speed, 0.0], [-speed, 0.0]], eos.rho_0
         )
-        each = np.full(mass.size, float(eos.rho_0))
-        return base.InitialState(position, velocity, mass, 0.0 * each, {"density": each})
+        each = np.ones(mass.size)
+        others = {"density": eos.rho_0 * each, "body": np.where(velocity[0] > 0.0, 1.0, 2.0)}
+        return base.InitialState(position, velocity, mass, 0.0 * each, others)
 
     def diagnostics(self, particles) -> dict[str, float]:
         """Return ring_gap, approach and angular_momentum.
 
         ring_gap: shortest distance between particles of the two rings, less one spacing. approach:
         relative velocity of the centres of mass over that at t = 0; negative after the rebound.
-        angular_momentum: of all particles about the centre of mass of all, over the sum of
-        m |r| v at t = 0.
+        angular_momentum: about the centre of mass of all particles, over the sum of m |x| |v| of
+        the two rings as points at t = 0.
         """
         left = self._is_left(particles.id)
         m, v = particles.mass, particles.velocity
@@ -124,7 +125,7 @@ class Problem(base.Problem):
         return {
             "ring_gap": self._gap(particles, left),
             "approach": float((mean[0] - mean[1]) / (2.0 * self._speed)),
-            "angular_momentum": self._angular_momentum(particles),
+            "angular_momentum": solids.angular_momentum(particles) / self._swing(particles),
         }
 
     def over_time(self, eos, history: dict[str, np.ndarray]) -> dict[str, float]:
@@ -149,7 +150,7 @@ class Problem(base.Problem):
         return found
 
     def report(self, eos, time: float, particles, pressure) -> dict[str, float]:
-        """Return the columns of the history, and pieces: the number of separate bodies."""
+        """Return the columns of the history."""
         return self.diagnostics(particles)
 
     def _is_left(self, ids: np.ndarray) -> np.ndarray:
@@ -162,10 +163,6 @@ class Problem(base.Problem):
         apart, _ = cKDTree(x[left]).query(x[~left])
         return float(apart.min() - self._placed[0].spacing)
 
-    def _angular_momentum(self, particles) -> float:
-        m = particles.mass
-        share = m / m.sum()
-        x, y = particles.position - (particles.position @ share)[:, None]
-        u, v = particles.velocity - (particles.velocity @ share)[:, None]
-        scale = m.sum() * self._speed * (self.outer + 0.5 * self.gap)
-        return float((m * (x * v - y * u)).sum() / scale)
+    def _swing(self, particles) -> float:
+        """Return the sum of m |x| |v| of the two rings as points at t = 0."""
+        return float(particles.mass.sum() * self._speed * (self.outer + 0.5 * self.gap))

@@ -14,7 +14,7 @@ import numpy as np
 from pydantic import Field, PrivateAttr, model_validator
 
 from sph.problems import base
-from sph.problems.support import bodies
+from sph.problems.support import bodies, solids
 
 # Finite elements of the same posed problem: final length and largest radius over the initial ones,
 # by dimension (2-D: plane strain, half width).
@@ -32,8 +32,8 @@ class Problem(base.Problem):
             "name": "mie_gruneisen", "rho_0": 7850.0, "c_0": 3600.0, "slope": 1.8, "gruneisen": 1.81
         },
         "physics.strength": {"name": "elastic_plastic", "shear_modulus": 8e10, "yield_stress": 6e8},
-        "time.end": 6.5e-5,
-        "output.interval": 6.5e-6,
+        "time.end": 5e-5,
+        "output.interval": 5e-6,
     }  # fmt: skip
     limits: ClassVar = {
         "energy_drift": base.Limit(5e-3, "plastic work turns kinetic energy into heat"),
@@ -115,9 +115,9 @@ class Problem(base.Problem):
 
     def under(self, physics):
         """Return the problem with its strength; ValueError unless the bar is of one solid."""
-        bodies.check_solid(physics)
+        _, strength = solids.required(physics)
         found = self.model_copy()
-        found._strength = physics.strength_model()
+        found._strength = strength
         return found
 
     def fills_box(self, eos) -> bool:

@@ -227,24 +227,6 @@ def _near(body: Placed, other: Placed, reach: float) -> np.ndarray:
     return body.position[:, ((low <= body.position) & (body.position <= high)).all(axis=0)]
 
 
-def check_solid(physics) -> None:
-    """Raise ValueError, which begins with a key of [physics], unless that is one solid material."""
-    if physics.formulation != "continuum":
-        raise ValueError(
-            f'physics.formulation = "{physics.formulation}": expected "continuum", the formulation '
-            "with solids"
-        )
-    if getattr(physics, "materials", None) is not None:
-        raise ValueError("physics.materials is given: expected one material in this problem")
-    if not hasattr(physics.eos_model(), "rho_0"):
-        raise ValueError(
-            f"physics.eos = {physics.shown('eos')}: expected an equation of state with a reference "
-            'density, such as "tait" or "mie_gruneisen"'
-        )
-    if physics.strength is None:
-        raise ValueError("physics.strength is missing: this problem is about a solid")
-
-
 def of_one_material(placed: tuple[Placed, ...], velocities, density: float) -> tuple:
     """Return position, velocity (D, N) and mass (N,) of bodies of one density; mass as in eq 455.
 
