@@ -76,6 +76,7 @@ class Continuum(Formulation):
             "neighbours is 1; 1 for exact gradients of linear fields, also at free surfaces",
             kind=Literal[-1, 0, 1],
             default=0,
+            restart="refused",  # order 1 has a column of its own in the history
         ),
         Key("q_a", "coefficient of the quadratic artificial viscosity", kind=float, default=2.0,
             at_least=0.0),
@@ -180,7 +181,7 @@ class Continuum(Formulation):
         found += [Field("stress", rank=2, stored=False)]
         found += [PLASTIC_STRAIN] * self.yields
         if self.corrects_tension:
-            found += [Field("initial_support", above=0.0)]
+            found += [Field("initial_support", remade=True, above=0.0)]
             found += [Field("tension", rank=2, stored=False)]
         return tuple(found)
 
@@ -274,6 +275,10 @@ class Continuum(Formulation):
         material = state.get("material")
         kind = np.zeros(state.number) if material is None else material
         pieces.start(state, support, self.domain, strengths[kind.astype(int)])
+
+    def remake(self, state, missing):
+        if "initial_support" in missing:  # the density of a solid has changed little
+            self.start(state)
 
     def pressure(self, state):
         return self._by_material(state, lambda one, rho, u: one.eos.pressure(rho, u))
