@@ -12,6 +12,7 @@ from sph.domain import Domain
 from sph.errors import FileError
 from sph.output import checkpoint, same_run
 from sph.output.run_directory import RunDirectory, find
+from sph.problems.support import solids
 
 
 @dataclass(frozen=True)
@@ -140,11 +141,13 @@ class State:
         return f"$t$ = {self.time:.4g}"
 
     def scalar(self, name: str) -> np.ndarray:
-        """(N,) density, pressure, internal_energy, or speed |v|."""
+        """(N,) density, pressure, internal_energy, speed |v|, or stress -sigma_xx of a solid."""
         if name == "speed":
             return np.linalg.norm(self.particles.velocity, axis=0)
         if name == "pressure":
             return self.checkpoint.pressure
+        if name == "stress":
+            return solids.compressive_stress(self.particles, self.checkpoint.pressure)
         return getattr(self.particles, name)
 
     def exact(self, position: np.ndarray) -> dict[str, np.ndarray] | None:

@@ -21,6 +21,7 @@ SYMBOLS = {
     "velocity": r"$v$",
     "pressure": r"$P$",
     "internal_energy": r"$u$",
+    "stress": r"$-\sigma_{xx}$",
     "speed": r"$|\mathbf{v}|$",
 }
 # Perceptually uniform, one a field, so that a reader does not take one for another.

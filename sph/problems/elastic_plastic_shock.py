@@ -1,0 +1,40 @@
+"""Symmetric impact of two elastic-plastic plates: an elastic precursor, and a slower plastic shock.
+
+Material between the two fronts is at the Hugoniot elastic limit (eqs 443-445). The problem is that
+of `flyer_plate` with strength and at lower speed.
+"""
+
+from typing import Annotated, ClassVar, Literal
+
+from pydantic import Field
+
+from sph.problems import base, flyer_plate
+from sph.problems.support import solids
+
+
+class Problem(flyer_plate.Problem):
+    """Two elastic-plastic steel plates that collide at 100 m/s each (SI units)."""
+
+    defaults: ClassVar = {
+        "physics.formulation": "continuum",
+        "physics.correction": 1,
+        "physics.eos": solids.STEEL,
+        "physics.strength": {
+            "name": "elastic_plastic",
+            "shear_modulus": solids.SHEAR_MODULUS,
+            "yield_stress": solids.YIELD_STRESS,
+        },
+        "time.end": 8e-6,
+        "output.interval": 2e-6,
+    }
+    limits: ClassVar = {
+        "energy_drift": base.Limit(1e-4, "TODO"),
+        "elastic_limit_error": base.Limit(0.02, "TODO"),
+        "precursor_speed_error": base.Limit(0.02, "TODO"),
+        "shock_speed_error": base.Limit(0.02, "TODO"),
+        "shock_stress_error": base.Limit(0.02, "TODO"),
+    }
+
+    name: Literal["elastic_plastic_shock"] = "elastic_plastic_shock"  # type: ignore[assignment]
+    n: Annotated[int, base.Problem.model_fields["n"]] = 600
+    speed: float = Field(default=100.0, gt=0.0, description="speed of each plate")
