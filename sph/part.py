@@ -71,8 +71,9 @@ class Evolved(NamedTuple):
 
 # The stages of a step, in order: prediction of inactive particles (individual steps);
 # density and quantities that follow from it; gradients, which need the density; rates of change;
-# additions to the rates.
-STAGES = ("prediction", "density", "gradients", "rates", "additions")
+# additions to the rates; constraints on the rates; corrections of evolved fields at the end of the
+# step, after `leapfrog.correct`.
+STAGES = ("prediction", "density", "gradients", "rates", "additions", "constraints", "correction")
 
 
 class Pass(NamedTuple):
@@ -104,7 +105,8 @@ class Pass(NamedTuple):
     at_start: bool = True  # also run before the first step
     takes_step: bool = False  # takes the length of the step as last argument
     takes_sweep: bool = False  # an uncompiled function that takes the sweep as first argument
-    models_at_start: Any = None  # before the first step, if not those of the formulation
+    models: Any = None  # those of the formulation, if None
+    models_at_start: Any = None  # before the first step, if not the same
 
     @property
     def arrays(self) -> tuple[str | None, ...]:
@@ -217,6 +219,12 @@ class Part:
 
     def check(self, simulation) -> None:
         """Raise NumericalError if the state is unphysical for this part."""
+
+    def check_output(self, simulation) -> None:
+        """Raise NumericalError for a state that no checkpoint should hold.
+
+        Called before each checkpoint, for checks that take too long for each step.
+        """
 
     def criterion_words(self, criterion: str) -> str | None:
         """Return a description of a criterion of this part, or None for other criteria."""

@@ -118,10 +118,9 @@ def doubt(simulation) -> str | None:
 
 
 def _gap_of(simulation) -> Gap:
-    p, scene = simulation.particles, simulation.scene
-    eos = scene.eos
+    p = simulation.particles
     with np.errstate(all="ignore"):  # unphysical states, which the watchdog reports
-        sound_speed = eos.sound_speed(p.density, eos.pressure(p.density, p.internal_energy))
+        sound_speed = simulation.scene.formulation.sound_speed(p)
     return largest_gap(p, _spacing(simulation), sound_speed)
 
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from sph import declarations, parts, registry, simd
 from sph.config import Config
+from sph.config.toml_text import value_text
 from sph.domain import Domain
 from sph.errors import ConfigError
 from sph.formulations import Formulation
@@ -93,6 +94,16 @@ class Scene:
         return tuple(sorted(found, key=lambda one: STAGES.index(one.stage)))
 
     @cached_property
+    def rate_passes(self) -> tuple[Pass, ...]:
+        """The passes between prediction and correction."""
+        return tuple(one for one in self.passes if one.stage != STAGES[-1])
+
+    @cached_property
+    def last_passes(self) -> tuple[Pass, ...]:
+        """The passes after the correction."""
+        return tuple(one for one in self.passes if one.stage == STAGES[-1])
+
+    @cached_property
     def keeps_momentum(self) -> np.ndarray:
         """(D,) 1.0 for axes along which momentum is conserved (no wall, no field), else 0.0."""
         kept = all(part.keeps_momentum for part in self.all_parts)
@@ -156,13 +167,30 @@ class Scene:
         problem = self.config.problem
         try:
             with np.errstate(all="ignore"):
-                return problem.initial(self.eos)
+                found = problem.initial(self.eos)
+                return self._with_density(found) if self._evolves("density") else found
         except (ArithmeticError, ValueError) as error:
             raise ConfigError(
                 f"problem.name = {problem.name}: particles cannot be placed with these settings "
                 f"({error}).\nTry: numbers in [problem] closer to 1, and sides of problem.domain "
                 "of similar length."
             ) from error
+
+    def _evolves(self, name: str) -> bool:
+        return any(one.value == name for part in self.all_parts for one in part.evolved)
+
+    def _with_density(self, start: InitialState) -> InitialState:
+        """Return `start` with the density of the particles, which the formulation integrates."""
+        if "density" in start.others:
+            return start
+        exact = self.config.problem.exact(self.eos, 0.0, start.position)
+        if exact is None or not exact["density"].min() > 0.0:
+            raise ConfigError(
+                f"physics.formulation = {value_text(self.physics.formulation)}: it integrates the "
+                f"density in time, and problem.name = {self.config.problem.name} states no initial "
+                "density.\nTry: another problem, or another formulation."
+            )
+        return start._replace(others={**start.others, "density": exact["density"]})
 
     def described(self) -> tuple[list[str], list[str]]:
         """Return descriptions of the compiled physics, and of the omitted physics with reasons."""

@@ -194,11 +194,13 @@ class Simulation:
         self.make_passes()
         with self.clock.phase("predict, correct"):
             self.energy_injected += leapfrog.correct(p, self.evolved, dt, self.team)
+        for one in self.scene.last_passes:
+            self._make(one)
         self.end_step(dt, end, step_size.Past(dt, allowed))
 
     def make_passes(self) -> None:
         """Run the passes of a step, with the lists that they need."""
-        for one in self.scene.passes:
+        for one in self.scene.rate_passes:
             self._make(one)
 
     def split(self, dt: float) -> None:
@@ -235,6 +237,8 @@ class Simulation:
         """Raise an error for a stored field that could not be read back from a checkpoint."""
         declarations.check_arrays(self.scene.all_parts, self.particles)
         self.watchdog.check_fields(self)
+        for part in self.scene.all_parts:
+            part.check_output(self)
 
     @property
     def volume_ratio(self) -> float | None:

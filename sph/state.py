@@ -5,6 +5,7 @@ the memory order, the contents of checkpoints, and the public names and units.
 """
 
 from collections.abc import Iterable, Mapping
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -111,13 +112,17 @@ class State:
 
     @classmethod
     def at_start(
-        cls, fields: Iterable[Field], position, velocity, mass, internal_energy
-    ) -> "State":
-        """Return particles with IDs 1 … N in the given order; all other fields are zero."""
+        cls, fields: Iterable[Field], position, velocity, mass, internal_energy,
+        others: Mapping[str, np.ndarray] = MappingProxyType({}),
+    ) -> "State":  # fmt: skip
+        """Return particles with IDs 1 … N in the given order; all other fields are zero.
+
+        others: values of further fields by name; ignored for fields that the scene lacks.
+        """
         dimension, n = position.shape
         given = {
             "position": position, "velocity": velocity, "mass": mass,
-            "internal_energy": internal_energy,
+            "internal_energy": internal_energy, **others,
         }  # fmt: skip
         arrays = {"id": np.arange(1, n + 1, dtype=np.int64)}
         for field in fields:

@@ -46,6 +46,8 @@ class Watchdog:
 
     def __init__(self, scene):
         self.max_drift = scene.config.physics.max_energy_drift
+        (energy,) = (one for one in scene.formulation.fields if one.name == "internal_energy")
+        self.lowest_energy = -math.inf if energy.at_least is None else energy.at_least
         box, kinds = scene.domain.box, scene.domain.boundaries
         open_axes = [axis for axis, kind in enumerate(kinds) if kind == "open"]
         self.fences = [
@@ -71,7 +73,7 @@ class Watchdog:
             ("mass", p.mass, 1.0 / LARGEST),
             ("position", p.position, -LARGEST),
             ("velocity", p.velocity, -LARGEST),
-            ("internal energy", p.internal_energy, 0.0),
+            ("internal energy", p.internal_energy, max(self.lowest_energy, -LARGEST)),
         ):
             bad = ~((values >= smallest) & (values < LARGEST))
             if bad.any():
@@ -109,12 +111,12 @@ class Watchdog:
         totals, dt = simulation.totals, simulation.limit.dt
         sums = (totals.energy, totals.max_density, totals.rates)
         lowest = (totals.min_density, totals.min_internal_energy)
-        if is_sound(*sums, dt, *lowest, simulation.time):
+        if is_sound(*sums, dt, *lowest, simulation.time, self.lowest_energy):
             return
         p = simulation.particles
         tests = (
             ("density", p.density, ~(p.density > 0) | ~np.isfinite(p.density)),
-            ("internal energy", p.internal_energy, ~(p.internal_energy >= 0)),
+            ("internal energy", p.internal_energy, ~(p.internal_energy >= self.lowest_energy)),
             ("velocity", p.velocity, ~np.isfinite(p.velocity)),
             ("acceleration", p.acceleration, ~np.isfinite(p.acceleration)),
             ("rate of energy", p.energy_rate, ~np.isfinite(p.energy_rate)),
@@ -208,11 +210,13 @@ class Watchdog:
 
 
 @register_jitable
-def is_sound(energy, max_density, rates, dt, min_density, min_energy, time) -> bool:
+def is_sound(
+    energy, max_density, rates, dt, min_density, min_energy, time, lowest_energy
+) -> bool:  # fmt: skip
     """Whether sums are finite, density and internal energy physical, and dt advances time."""
     return (
         min_density > 0.0
-        and min_energy >= 0.0
+        and min_energy >= lowest_energy
         and abs(energy) < math.inf
         and abs(max_density) < math.inf
         and abs(rates) < math.inf

@@ -5,6 +5,7 @@ import re
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 from pydantic import Field, create_model, model_validator
+from pydantic.fields import FieldInfo
 
 from sph import declarations, parts, registry
 from sph.config.choices import Choice, LabelledTable, ModelChoice, labelled_table, plain
@@ -16,6 +17,16 @@ from sph.problems.base import Section
 
 FORMULATIONS = "sph.formulations"
 DEFAULT = "gas"
+STRENGTHS = "sph.formulations.continuum.strength"
+
+
+class Material(Section):
+    """The laws of one of several materials."""
+
+    eos: Annotated[Any, ModelChoice("sph.eos")] = Field(description="equation of state")
+    strength: Annotated[Any, ModelChoice(STRENGTHS)] | None = Field(
+        None, description="law for the deviatoric stress; a fluid if not given"
+    )
 
 
 class Physics(Section):
@@ -52,12 +63,11 @@ class Physics(Section):
         examples=[{"name": "ideal_gas", "gamma": 1.4}],
         json_schema_extra=REFUSED,
     )
-    eta: float = Field(
-        1.6,
-        gt=0,
-        description="smoothing length h divided by the local particle spacing (m/rho)^(1/D), in D "
-        "dimensions; larger values give more neighbours",
-        json_schema_extra=RECORDED,
+    materials: dict[str, Material] | None = Field(
+        None,
+        description="the materials of a scene with several bodies by name, in place of gamma, eos "
+        'and strength; formulation "continuum" only',
+        json_schema_extra=REFUSED,
     )
     allow_pairing: bool = Field(
         False,
@@ -106,8 +116,24 @@ class Physics(Section):
         return registry.model("sph.kernels", self.kernel)
 
     def eos_model(self):
-        """Return the equation of state, a NamedTuple of `sph.eos`."""
+        """Return the equation of state, a NamedTuple of `sph.eos`; of several, the first."""
+        if self.materials:
+            return next(iter(self.materials_models().values()))[0]
         return registry.model("sph.eos", self.eos or {"name": "ideal_gas", "gamma": self.gamma})
+
+    def strength_model(self):
+        """Return the strength of a solid, a NamedTuple, or None; of several, the first."""
+        return next(iter(self.materials_models().values()))[1]
+
+    def materials_models(self) -> dict[str, tuple[Any, Any]]:
+        """Return the equation of state and the strength (or None) of each material, by name."""
+        if not self.materials:
+            strength = getattr(self, "strength", None)  # a key of one formulation
+            return {"": (self.eos_model(), registry.model(STRENGTHS, strength))}
+        return {
+            name: (registry.model("sph.eos", one.eos), registry.model(STRENGTHS, one.strength))
+            for name, one in self.materials.items()
+        }
 
     def given(self, **attributes: bool) -> list[str]:
         """Return the first key of each part that is given and has these class attributes."""
@@ -131,6 +157,10 @@ def table(formulation: str) -> type[Physics]:
     kinds = (registry.part_class(FORMULATIONS, formulation), *parts.classes(formulation))
     declarations.check_keys(kinds, dir(Physics) + list(Physics.model_fields), CLASSES)
     fields = {key.name: _field(key) for kind in kinds for key in kind.keys}
+    for name, default in kinds[0].defaults.items():
+        shared = Physics.model_fields[name]
+        own = FieldInfo.merge_field_infos(shared, default=default)
+        fields[name] = (shared.rebuild_annotation(), own)
     found = create_model("Physics", __base__=Physics, __doc__=Physics.__doc__, **fields)
     found.kinds = kinds
     return found

@@ -1,4 +1,4 @@
-"""Equations of state, one file each: pressure and sound speed of a gas."""
+"""Equations of state, one file each: pressure and sound speed of a gas, liquid or solid."""
 
 from collections.abc import Callable
 from typing import Any, Protocol
@@ -31,6 +31,8 @@ class Defaults(Model):
 
     # lowest_energy(density): the u at which the speed of sound becomes 0; None if this is u = 0
     lowest_energy: Callable[[Any], Any] | None = None
+    # whether the pressure may be negative at rest, which only the continuum formulation takes
+    under_tension = False
 
     @classmethod
     def required(cls) -> tuple[str, ...]:

@@ -3,6 +3,8 @@
 The `__init__.py` of a folder defines one subclass of `Formulation`.
 """
 
+from collections.abc import Mapping
+from types import MappingProxyType
 from typing import Any, ClassVar
 
 import numpy as np
@@ -19,8 +21,13 @@ class Formulation(Part):
 
     fields: tuple[Field, ...] = COMMON
     roles: ClassVar[tuple[str, ...]] = ()  # of the terms that its pair loops call
+    # defaults of keys of [physics] that every formulation has, if not those of most formulations
+    defaults: ClassVar[Mapping[str, Any]] = MappingProxyType({})
+    neighbours_key: ClassVar[str] = ""  # the key that sets the number of neighbours
     # The models that passes use, among them `kernel`, `eos`, `support_ratio` (H/h) and `eta`.
     models: Any
+
+    eos: Any  # of the scene or, where there are several materials, of the first
 
     @property
     def label(self) -> str:
@@ -30,6 +37,10 @@ class Formulation(Part):
     def pressure(self, state: State) -> np.ndarray:
         """Return the pressure (N,) of the state at the end of a step."""
         raise NotImplementedError
+
+    def sound_speed(self, state: State) -> np.ndarray:
+        """Return the speed of sound (N,) of the state at the end of a step."""
+        return self.eos.sound_speed(state.density, self.pressure(state))
 
 
 BASE = Formulation

@@ -177,6 +177,25 @@ def _kept_positive(energy, change):
     return energy + change, 0.0
 
 
+@njit(**ROUNDED)
+def _density_predict(first, last, dt, density, rate, mass, density_full) -> float:
+    """Advance `density` by half a step; write the full step to density_full. Both stay positive."""
+    for d in range(density.shape[0]):
+        for i in range(first, last):
+            start = density[d, i]
+            density_full[d, i], _ = _kept_positive(start, rate[d, i] * dt)
+            density[d, i], _ = _kept_positive(start, 0.5 * rate[d, i] * dt)
+    return 0.0
+
+
+@njit(**ROUNDED)
+def _density_correct(first, last, dt, density, rate, mass) -> float:
+    for d in range(density.shape[0]):
+        for i in range(first, last):
+            density[d, i], _ = _kept_positive(density[d, i], 0.5 * rate[d, i] * dt)
+    return 0.0
+
+
 # --- individual time steps ---
 
 
@@ -237,6 +256,8 @@ def _positive_correct_each(first, last, own, energy, rate, mass) -> float:
 
 
 STRAIGHT = Rule(_straight_predict, straight_correct, _straight_predict_each, straight_correct_each)
+# for a density that is integrated in time; individual steps take it from its rate (`bins`)
+DENSITY = Rule(_density_predict, _density_correct, _straight_predict_each, straight_correct_each)
 POSITIVE = Rule(
     _positive_predict, _positive_correct, _positive_predict_each, _positive_correct_each
 )

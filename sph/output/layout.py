@@ -171,7 +171,7 @@ def _header(checkpoint, frame: Frame) -> dict[str, Mapping]:
             "Dimension": np.array([dimension]),
             "Scheme": np.bytes_(checkpoint.scene.formulation.label),
             "Kernel function": np.bytes_(physics.kernel_model().name),
-            "Kernel eta": np.array([physics.eta]),
+            "Kernel eta": np.array([checkpoint.scene.formulation.models.eta]),
             "CFL parameter": np.array([physics.C]),
         },
     }

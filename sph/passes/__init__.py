@@ -75,7 +75,7 @@ class Sweep:
         if not is_jitted(one.function):
             self._call(one, arrays)
             return
-        models = self.models
+        models = self.models if one.models is None else one.models
         # Before the first step supports are guesses and must converge. Only the pass that finds
         # them gets models for that, so no other pass is compiled twice.
         if self.is_start and one.models_at_start is not None:

@@ -206,6 +206,35 @@ def _copy_values(lanes, copied, begin, field, block, factor):
     return copy
 
 
+def copy_tensors(lanes, dim, copied, begin, field, block, neighbours, image, factor):
+    """Copy an image of a symmetric tensor (D, D, N), its upper triangle; nothing for None.
+
+    Returns where the next quantity begins.
+    """
+
+
+@overload(copy_tensors, jit_options=INLINED)  # type: ignore[arg-type]
+def _copy_tensors(lanes, dim, copied, begin, field, block, neighbours, image, factor):
+    if isinstance(field, types.NoneType | types.Omitted):
+        return lambda lanes, dim, copied, begin, field, block, neighbours, image, factor: begin
+
+    def copy(lanes, dim, copied, begin, field, block, neighbours, image, factor):
+        sign, _ = neighbours.images
+        inside = field.shape[2] - block * BLOCK
+        to = begin
+        for a in range(len(dim)):
+            for b in range(a, len(dim)):
+                s = sign[image, a] * sign[image, b] * factor
+                for lane in range(0, BLOCK, block_width(lanes)):
+                    k = block * BLOCK + lane
+                    x = load_inside(lanes, field, (a, b, k), inside - lane, 0.0)
+                    store(copied, to + lane, x * s)
+                to += BLOCK
+        return to
+
+    return copy
+
+
 @njit(**INLINED)
 def copy_products(lanes, copied, begin, a, b, block, factor):
     """Copy the product of two fields (N,) of a block to `copied`, times factor."""

@@ -1,6 +1,8 @@
 """Base class of all problems: the shared keys, and the methods that the program calls."""
 
 import math
+from collections.abc import Mapping
+from types import MappingProxyType
 from typing import Any, ClassVar, Literal, NamedTuple
 
 import numpy as np
@@ -16,6 +18,9 @@ class InitialState(NamedTuple):
     velocity: np.ndarray  # (D, N)
     mass: np.ndarray  # (N,)
     internal_energy: np.ndarray  # (N,) per unit mass
+    # initial values of further fields, (N,) each, such as the density; ignored where a scene has no
+    # field of that name
+    others: Mapping[str, np.ndarray] = MappingProxyType({})
 
 
 class Limit(NamedTuple):
@@ -111,6 +116,11 @@ class Problem(Section):
         of [physics], if the problem cannot be set up under these physics.
         """
         return self
+
+    @property
+    def clamps(self) -> bool:
+        """Whether some particles are clamped (field "clamped" of the initial state)."""
+        return False
 
     def fills_box(self, eos) -> bool:
         """Return whether gas fills the box at all times, so that sum m/rho equals its volume."""

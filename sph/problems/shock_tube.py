@@ -163,7 +163,8 @@ class Problem(base.Problem):
         velocity[0] = state.velocity
         energy = eos.internal_energy(state.density, state.pressure)
         mass = np.repeat(masses, [stack.shape[1] for stack in stacks])
-        return base.InitialState(position, velocity, mass, energy)
+        density: Any = {"density": state.density}
+        return base.InitialState(position, velocity, mass, energy, density)
 
     def exact(self, eos, time: float, position: np.ndarray) -> dict[str, np.ndarray] | None:
         """Return the solution of the Riemann problem in an unbounded tube, at (D, N) positions.

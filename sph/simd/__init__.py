@@ -45,6 +45,14 @@ from sph.simd.spatial import (
     times,
     zeros,
 )
+from sph.simd.tensors import (
+    full_dim,
+    outer,
+    symmetric_at,
+    symmetric_dim,
+    symmetric_outer,
+    symmetric_times,
+)
 from sph.simd.types import DOUBLE, SCALAR, SINGLE, Double, Mask, Scalar, Single, Vec
 
 __all__ = [
@@ -68,6 +76,7 @@ __all__ = [
     "filled",
     "filled_block",
     "front",
+    "full_dim",
     "inverse_cbrt",
     "inverse_sqrt",
     "lane_max",
@@ -81,6 +90,7 @@ __all__ = [
     "load_spatial",
     "minus",
     "numbers_from",
+    "outer",
     "pick",
     "pick_spatial",
     "plus",
@@ -90,6 +100,10 @@ __all__ = [
     "store",
     "store_inside",
     "store_spatial",
+    "symmetric_at",
+    "symmetric_dim",
+    "symmetric_outer",
+    "symmetric_times",
     "times",
     "width",
     "zeros",

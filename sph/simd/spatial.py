@@ -22,7 +22,7 @@ from sph.simd.types import (
 )
 
 
-def _parts(context, builder, kind, value, wanted):
+def components(context, builder, kind, value, wanted):
     """Return the components of a tuple as values of the type `wanted`."""
     found = cgutils.unpack_tuple(builder, value)
     kinds = list(kind)
@@ -36,7 +36,7 @@ def _parts(context, builder, kind, value, wanted):
     ]
 
 
-def _common(*kinds):
+def common(*kinds):
     """Return the type of the components of a result: vectors if one operand has vectors."""
     parts = [one.dtype if isinstance(one, types.UniTuple) else one for one in kinds]
     return next((one for one in parts if isinstance(one, Vec)), types.float64)
@@ -139,7 +139,7 @@ def _componentwise(emit):
 
     @instruction
     def operation(typing_context, a, b):
-        kind = _common(a, b)
+        kind = common(a, b)
         size = len(a) if isinstance(a, types.BaseTuple) else len(b)
         result = types.UniTuple(kind, size)
 
@@ -147,7 +147,7 @@ def _componentwise(emit):
             pairs = []
             for one, value in zip(sig.args, arguments, strict=True):
                 if isinstance(one, types.BaseTuple):
-                    pairs.append(_parts(context, builder, one, value, kind))
+                    pairs.append(components(context, builder, one, value, kind))
                 else:
                     same = (
                         as_vector(context, builder, value, one, kind)
@@ -176,11 +176,11 @@ larger_each = _componentwise(
 @instruction
 def dot(typing_context, a, b):
     """Return the scalar product of two vectors of space."""
-    kind = _common(a, b)
+    kind = common(a, b)
 
     def generate(context, builder, sig, arguments):
-        x = _parts(context, builder, sig.args[0], arguments[0], kind)
-        y = _parts(context, builder, sig.args[1], arguments[1], kind)
+        x = components(context, builder, sig.args[0], arguments[0], kind)
+        y = components(context, builder, sig.args[1], arguments[1], kind)
         total = None
         for one, other in zip(x, y, strict=True):
             product = builder.fmul(one, other, flags=FAST)
@@ -193,12 +193,12 @@ def dot(typing_context, a, b):
 @instruction
 def cross(typing_context, a, b):
     """Return the cross product: 3 components in 3-D, the component normal to the plane in 2-D."""
-    kind = _common(a, b)
+    kind = common(a, b)
     result = types.UniTuple(kind, 3 if len(a) == 3 else 1)
 
     def generate(context, builder, sig, arguments):
-        x = _parts(context, builder, sig.args[0], arguments[0], kind)
-        y = _parts(context, builder, sig.args[1], arguments[1], kind)
+        x = components(context, builder, sig.args[0], arguments[0], kind)
+        y = components(context, builder, sig.args[1], arguments[1], kind)
 
         def minor(i, j):
             first = builder.fmul(x[i], y[j], flags=FAST)

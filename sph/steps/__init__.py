@@ -53,6 +53,7 @@ class Steps:
         self._fixed = np.empty(driver.LONGEST + 1)
         self._fixed[driver.COURANT], self._fixed[driver.END] = bounds.courant, bounds.end
         self._fixed[driver.MAX_DRIFT] = watchdog.max_drift
+        self._fixed[driver.LOWEST] = watchdog.lowest_energy
         self._fixed[driver.BOX] = scene.domain.volume if scene.is_filled else 0.0
 
     def may_begin(self) -> bool:

@@ -36,10 +36,12 @@ PAUSED, STALE, WIDER, DOUBTFUL = range(4)
 NOW, LIMIT, GIVEN, LIMITED, REACH, LENGTH, UNTIL, NEXT = range(8)
 
 # Entries of `fixed`, numbers that do not change within a call. BOX: volume of a box that gas fills,
-# 0 for others; STEP: number of steps before the call; LONGEST: seconds after which to return.
+# 0 for others; STEP: number of steps before the call; LOWEST: bound of the internal energy;
+# LONGEST: seconds after which to return.
 (
-    STOP, SKIN, COURANT, END, MAX_DRIFT, BASE_ENERGY, BASE_SCALE, ADDED, BOX, STEP, LONGEST,
-) = range(11)  # fmt: skip
+    STOP, SKIN, COURANT, END, MAX_DRIFT, BASE_ENERGY, BASE_SCALE, ADDED, BOX, STEP, LOWEST,
+    LONGEST,
+) = range(12)  # fmt: skip
 
 # What the result of a call is: energy injected (GIVES), motion since lists were built (MOVES),
 # whether the first pass found all supports (FINDS), number of supports limited by max_support
@@ -191,7 +193,7 @@ def _passes_checks(fixed, step, row):
     return (
         is_sound(
             row[KINETIC] + row[INTERNAL], row[MAX_DENSITY], row[RATES], row[STEP_LIMIT],
-            row[MIN_DENSITY], row[MIN_ENERGY], row[TIME],
+            row[MIN_DENSITY], row[MIN_ENERGY], row[TIME], fixed[LOWEST],
         )
         and abs(row[DRIFT]) <= fixed[MAX_DRIFT]
         and abs(ratio) < np.inf

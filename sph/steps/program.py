@@ -60,9 +60,11 @@ class Program:
         self._add_prediction()
         self.after_prediction = len(self._ends)
         lists = Held("neighbours", neighbours._replace(reach_factor=Held("reach", 1.0)))
-        for one in simulation.scene.passes:
+        for one in simulation.scene.rate_passes:
             self._add_pass(one, lists)
         self._add_correction()
+        for one in simulation.scene.last_passes:
+            self._add_pass(one, lists)
         self._add_sums()
         self.words, calls = self._table.finished()
         self.numbers = self.words.view(np.float64)
@@ -141,7 +143,8 @@ class Program:
         s = self._simulation
         phase, swaps = self._phases.index(one.phase), one.swaps is not None
         superblocks = Held("superblocks", lists.value.superblocks)
-        arguments = [0, superblocks, s.sweep.dim, s.sweep.models, lists, *self._of(*one.arrays)]
+        models = s.sweep.models if one.models is None else one.models
+        arguments = [0, superblocks, s.sweep.dim, models, lists, *self._of(*one.arrays)]
         arguments += [s.sweep.wanted] * one.widens + [self._dt] * one.takes_step
         if not one.widens:
             self._add(driver.NOTHING, one.function, *arguments, swaps=swaps, phase=phase)

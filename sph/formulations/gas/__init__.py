@@ -46,6 +46,14 @@ class Gas(Formulation):
 
     keys = (
         Key(
+            "eta",
+            "smoothing length h divided by the local particle spacing (m/rho)^(1/D), in D "
+            "dimensions; larger values give more neighbours",
+            kind=float,
+            default=1.6,
+            above=0.0,
+        ),
+        Key(
             "scheme",
             "pair force: how a pair of neighbours accelerate each other and exchange energy; "
             "`sph list` describes each",
@@ -70,6 +78,7 @@ class Gas(Formulation):
             at_most=100,  # more iterations change nothing but the time that a step takes
         ),
     )
+    neighbours_key = "physics.eta"
     roles = ("viscosity", "balsara", "exchange")
     reserves = ("pressure", "energy_shift", "div_v", "curl_v")
     evolved = (Evolved("internal_energy", "energy_rate", "predicted_energy", POSITIVE),)

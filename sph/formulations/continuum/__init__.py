@@ -1,0 +1,355 @@
+"""Fluids and solids by SPH of the continuum equations: evolved density, corrected kernel."""
+
+from typing import Any, Literal, NamedTuple
+
+import numpy as np
+
+from sph import faults
+from sph.formulations import Formulation
+from sph.formulations.continuum.clamps import hold
+from sph.formulations.continuum.gradients import gradients
+from sph.formulations.continuum.material import Material, stresses, yielded
+from sph.formulations.continuum.rates import rates
+from sph.formulations.continuum.rotation import JAUMANN
+from sph.formulations.continuum.support import supports
+from sph.integrators.leapfrog import DENSITY, STRAIGHT
+from sph.part import Evolved, Key, Pass
+from sph.state import COMMON, Field, Public
+
+STRENGTH = "sph.formulations.continuum.strength"
+
+# Support radius over the smoothing length d of the equations.
+SUPPORT_RATIO = 2.0
+
+DEVIATOR = Field(
+    "deviatoric_stress",
+    rank=2,
+    public=Public("DeviatoricStressTensors", -1, 1, -2, -5, "Deviator of the stress tensor"),
+)
+PLASTIC_STRAIN = Field(
+    "plastic_strain",
+    at_least=0.0,
+    public=Public("PlasticStrains", 0, 0, 0, 0, "Equivalent plastic strain"),
+)
+MATERIAL = Field(
+    "material",
+    at_least=0.0,
+    public=Public("Materials", 0, 0, 0, 0, "Number of the material in the configuration, from 0"),
+)
+CLAMPED = Field(
+    "clamped",
+    at_least=0.0,
+    public=Public("Clamped", 0, 0, 0, 0, "1 for particles that no force moves, otherwise 0"),
+)
+
+
+class ContinuumModels(NamedTuple):
+    """The models in the formulas. Their types, not their parameters, decide the compiled code."""
+
+    kernel: tuple
+    eos: tuple  # of the first material
+    q_a: float
+    q_b: float
+    support_ratio: float  # H/d
+    eta: float  # d over the particle spacing
+    max_support: float  # upper limit of H; inf for no limit
+
+
+class Continuum(Formulation):
+    """Continuity, kernel correction, constitutive laws and rates."""
+
+    defaults = {"kernel": "cubic_spline", "energy_limit": False}  # noqa: RUF012
+    neighbours_key = "physics.spacing_ratio"
+    keys = (
+        Key(
+            "spacing_ratio",
+            "smoothing length d divided by the local particle spacing (m/rho)^(1/D), in D "
+            "dimensions; the support radius is 2 d; larger values give more neighbours",
+            kind=float,
+            default=1.2,
+            above=0.0,
+        ),
+        Key(
+            "correction",
+            "order of the kernel correction: -1 for none; 0 for a kernel whose sum over the "
+            "neighbours is 1; 1 for exact gradients of linear fields, also at free surfaces",
+            kind=Literal[-1, 0, 1],
+            default=0,
+        ),
+        Key("q_a", "coefficient of the quadratic artificial viscosity", kind=float, default=2.0,
+            at_least=0.0),
+        Key("q_b", "coefficient of the linear artificial viscosity", kind=float, default=1.0,
+            at_least=0.0),
+        Key(
+            "balsara",
+            "Balsara factor: reduces artificial viscosity where the flow shears or rotates",
+            kind=bool,
+            default=True,
+        ),
+        Key(
+            "strength",
+            "law for the deviatoric stress of a solid; a fluid if not given",
+            models=STRENGTH,
+            restart="refused",
+            example={"name": "elastic", "shear_modulus": 1.0},
+        ),
+        Key(
+            "tensile_correction",
+            "coefficient of the tensile correction, which repels close particles of a solid under "
+            "tension so that they do not form clumps (Gray et al. 2001 use 0.3); 0 for none",
+            kind=float,
+            default=0.0,
+            at_least=0.0,
+            restart="same kind",
+        ),
+        Key(
+            "allow_tearing",
+            "let a run go on in which a solid body has torn into pieces, although no law of "
+            "fracture says where it breaks",
+            kind=bool,
+            default=False,
+            restart="free",
+        ),
+    )  # fmt: skip
+    reserves = (
+        "pressure", "stress", "deviatoric_stress", "stress_rate", "predicted_stress",
+        "plastic_strain", "material", "clamped", "balsara", "kernel_factor", "kernel_gradient",
+        "kernel_matrix", "tension", "initial_support",
+    )  # fmt: skip
+    bounds_acceleration = True  # cold matter at rest has no other bound
+
+    def __init__(self, scene):
+        physics = scene.physics
+        self.dimension = scene.dimension
+        self.order = physics.correction
+        self.spacing_ratio = float(physics.spacing_ratio)
+        self.is_clamped = scene.config.problem.clamps
+        self.keeps_momentum = not self.is_clamped
+        self.has_balsara = physics.balsara
+        self.tensile_correction = float(physics.tensile_correction)
+        self.names = tuple(physics.materials_models())
+        self.materials = tuple(
+            Material(float(number), eos, strength, self.tensile_correction)
+            for number, (eos, strength) in enumerate(physics.materials_models().values())
+        )
+        self.eos = self.materials[0].eos
+        strengths = [one.strength for one in self.materials if one.strength is not None]
+        self.is_solid = bool(strengths)
+        self.yields = any(one.yields for one in strengths)
+        self.corrects_tension = self.is_solid and self.tensile_correction > 0.0
+        self.models = ContinuumModels(
+            kernel=physics.kernel_model(),
+            eos=self.eos,
+            q_a=float(physics.q_a),
+            q_b=float(physics.q_b),
+            support_ratio=SUPPORT_RATIO,
+            eta=self.spacing_ratio,
+            max_support=scene.max_support,
+        )
+        self.fields = self._fields()
+        self.evolved = self._evolved()
+        self.passes = self._passes()
+        self.columns = ("corrections_failed",) if self.order == 1 else ()
+        self.idle = () if self.order == 1 else ("sums",)
+
+    @classmethod
+    def of(cls, scene):
+        return cls(scene)
+
+    def _fields(self) -> tuple[Field, ...]:
+        # elastic energy released in tension may exceed the heat
+        found = [
+            field._replace(at_least=None) if field.name == "internal_energy" else field
+            for field in COMMON
+        ]
+        found += [Field("density_rate"), Field("predicted_density", stored=False)]
+        found += [Field("div_v", stored=False), Field("velocity_gradient", rank=2, stored=False)]
+        found += [Field("kernel_factor", stored=False)] * (self.order == 0)
+        found += [Field("kernel_gradient", rank=1, stored=False)] * (self.order >= 0)
+        found += [Field("kernel_matrix", rank=2, stored=False)] * (self.order == 1)
+        found += [Field("balsara", stored=False)] * self.has_balsara
+        found += [MATERIAL] * (len(self.materials) > 1)
+        found += [CLAMPED] * self.is_clamped
+        if not self.is_solid:
+            return (*found, Field("pressure", stored=False))
+        found += [DEVIATOR, Field("stress_rate", rank=2)]
+        found += [Field("predicted_stress", rank=2, stored=False)]
+        found += [Field("stress", rank=2, stored=False)]
+        found += [PLASTIC_STRAIN] * self.yields
+        if self.corrects_tension:
+            found += [Field("initial_support", above=0.0)]
+            found += [Field("tension", rank=2, stored=False)]
+        return tuple(found)
+
+    def _evolved(self) -> tuple[Evolved, ...]:
+        found = (
+            Evolved("internal_energy", "energy_rate", "predicted_energy", STRAIGHT),
+            Evolved("density", "density_rate", "predicted_density", DENSITY),
+        )
+        if not self.is_solid:
+            return found
+        return (
+            *found, Evolved("deviatoric_stress", "stress_rate", "predicted_stress", JAUMANN)
+        )  # fmt: skip
+
+    def _passes(self) -> tuple[Pass, ...]:
+        """Return the passes, with the fields that this scene has."""
+        declared = {field.name for field in self.fields}
+
+        def of(*names):
+            return tuple(name if name in declared else None for name in names)
+
+        matter = ("position", "predicted_velocity", "mass", "predicted_density", "support")
+        corrections = of("kernel_factor", "kernel_gradient", "kernel_matrix")
+        strain = ("velocity_gradient", "div_v")
+        return (
+            Pass(
+                "density",
+                "density",
+                supports,
+                ("support", "mass", "predicted_density"),
+                ("support_before",),
+                swaps=("support", "support_before"),
+                widens=True,
+            ),
+            Pass(
+                "density",
+                "density",
+                gradients,
+                matter,
+                (*corrections, *strain, "density_rate"),
+            ),
+            *[
+                Pass(
+                    "gradients",
+                    "stress",
+                    stresses,
+                    ("predicted_density", "predicted_energy", "support", *strain,
+                     *of("material", "plastic_strain")),
+                    of("pressure", "stress", "sound_speed", "balsara", "stress_rate", "tension"),
+                    of("predicted_stress"),
+                    models=one,
+                )
+                for one in self.materials
+            ],
+            Pass(
+                "rates",
+                "rates",
+                rates,
+                (*matter, *of("sound_speed", "balsara", "pressure", "stress"), *corrections,
+                 *of("tension", "initial_support"), "velocity_gradient"),
+                ("acceleration", "energy_rate", "signal_speed"),
+            ),
+            *[
+                Pass("constraints", "rates", hold, ("clamped",), updates=("acceleration",))
+            ] * self.is_clamped,
+            *[
+                Pass(
+                    "correction",
+                    "stress",
+                    yielded,
+                    ("internal_energy", *strain, *of("material")),
+                    updates=("deviatoric_stress", "plastic_strain"),
+                    models=one,
+                    at_start=False,
+                )
+                for one in self.materials
+                if one.strength is not None and one.strength.yields
+            ],
+        )  # fmt: skip
+
+    # --- state ---
+
+    def start(self, state):
+        if self.corrects_tension:
+            spacing = (state.mass / state.density) ** (1.0 / self.dimension)
+            state.initial_support[:] = SUPPORT_RATIO * self.spacing_ratio * spacing
+
+    def pressure(self, state):
+        return self._by_material(state, lambda one, rho, u: one.eos.pressure(rho, u))
+
+    def sound_speed(self, state):
+        def of(one, rho, u):
+            c = one.eos.sound_speed(rho, one.eos.pressure(rho, u))
+            G = 0.0 if one.strength is None else one.strength.shear_modulus
+            return np.sqrt(c * c + 4.0 / 3.0 * G / rho)  # eq 415
+
+        return self._by_material(state, of)
+
+    def stress(self, state) -> np.ndarray:
+        """Return the stress tensor (D, D, N) of the state at the end of a step."""
+        deviator = state.get("deviatoric_stress")
+        shape = (self.dimension, self.dimension, state.number)
+        found = np.zeros(shape) if deviator is None else deviator.copy()
+        for d in range(self.dimension):
+            found[d, d] -= self.pressure(state)
+        return found
+
+    def _by_material(self, state, formula: Any) -> np.ndarray:
+        """Return formula(material, density, internal energy), (N,)."""
+        if len(self.materials) == 1:
+            return formula(self.materials[0], state.density, state.internal_energy)
+        found = np.empty(state.number)
+        for one in self.materials:
+            there = state.material == one.number
+            found[there] = formula(one, state.density[there], state.internal_energy[there])
+        return found
+
+    def sums(self, state):
+        """Return corrections_failed: the number of particles at which order 1 fell back to 0."""
+        if self.order != 1:
+            return {}
+        # the kernel has a gradient of its own only there
+        return {"corrections_failed": float(state.kernel_gradient.any(axis=0).sum())}
+
+    # --- words ---
+
+    @property
+    def label(self):
+        return "continuum"
+
+    def described(self):
+        kernel = self.models.kernel
+        inside = [
+            f"continuum equations, kernel {kernel.name}, correction of order {self.order}",
+            "density by the equation of continuity",
+        ]
+        outside = []
+        for name, one in zip(self.names, self.materials, strict=True):
+            of = f"material {name}: " * (len(self.materials) > 1)
+            inside.append(f"{of}equation of state {one.eos.name}")
+            if one.strength is not None:
+                inside.append(f"{of}strength {one.strength.name}")
+        for there, what, why_not in (
+            (self.is_solid, "stress tensor", "physics.strength is not given"),
+            (self.corrects_tension, "tensile correction", "physics.tensile_correction is 0"
+             if self.is_solid else "fluids do not need it"),
+            (self.has_balsara, "Balsara factor", "physics.balsara = false"),
+            (self.is_clamped, "clamped particles", "the problem has none"),
+            (len(self.materials) > 1, "several materials", "the scene has one"),
+        ):  # fmt: skip
+            if there:
+                inside.append(what)
+            else:
+                outside.append((what, why_not))
+        return inside, outside
+
+    def check(self, simulation):
+        """Raise NumericalError if the stress or the sound speed of a particle is not a number."""
+        p = simulation.particles
+        tests = [("sound speed", p.sound_speed, p.sound_speed)]
+        if self.is_solid:
+            deviator = p.deviatoric_stress
+            tests.append(("stress", deviator.sum(axis=(0, 1)), deviator.sum(axis=(0, 1))))
+        for name, values, _ in tests:
+            if np.isfinite(values).all():
+                continue
+            i = int(np.flatnonzero(~np.isfinite(values))[0])
+            raise faults.fault(
+                simulation,
+                f"{name} of particle {p.id[i]} is {values[i]}: density {p.density[i]:.6g}, "
+                f"internal energy {p.internal_energy[i]:.6g}",
+                "smaller steps (physics.C), more viscosity (physics.q_a, physics.q_b), or an "
+                "equation of state that holds at this density",
+                int(p.id[i]),
+            )

@@ -1,0 +1,164 @@
+"""Constitutive laws, once per particle: stress and sound speed from density, energy and strain.
+
+Each material of a scene has its own pass, which leaves the particles of other materials alone.
+"""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numba import njit, types
+from numba.extending import overload
+
+from sph.arrays import empty
+from sph.compiled import COMPILED, INLINED
+from sph.eos import pressure as pressure_of
+from sph.eos import sound_speed as sound_speed_of
+from sph.formulations.continuum.radial_return import equivalent_stress, returned
+from sph.formulations.continuum.tension import tensile
+from sph.neighbours.order import BLOCK
+
+# Softening of the viscosity's switch, in units of c/d (eq 410).
+SOFTENING = 1e-4
+
+
+class Material(NamedTuple):
+    """A material: its number in the scene, its laws, and the tensile correction's epsilon."""
+
+    number: float
+    eos: Any
+    strength: Any  # None for a fluid
+    tensile_correction: float
+
+
+@njit(**COMPILED)
+def stresses(
+    first, last, dim, models, neighbours, density, energy, support, velocity_gradient, div_v,
+    number, plastic_strain, predicted_stress, pressure, stress, sound_speed, balsara, stress_rate,
+    tension,
+):  # fmt: skip
+    """Pass over superblocks [first, last): eqs 410, 415 and those of the material's laws.
+
+    Reads the predicted density and energy (N,), support (N,), velocity_gradient (D, D, N), div_v
+    (N,), number (N,) of each particle's material and plastic_strain (N,). Moves predicted_stress
+    (D, D, N) to the yield surface. Writes pressure (N,) where the scene has no strength, otherwise
+    stress, stress_rate (D, D, N); sound_speed, balsara (N,); tension (D, D, N). An array is None if
+    the scene does not need it.
+    """
+    D, lists, eos, strength = len(dim), neighbours.lists, models.eos, models.strength
+    i_end = min(lists.first[last] * BLOCK, density.size)
+    axes = empty((2, 3, 3), np.float64)  # scratch
+    for i in range(lists.first[first] * BLOCK, i_end):
+        if number is not None and number[i] != models.number:
+            continue
+        rho, u = density[i], energy[i]
+        P = pressure_of(eos, rho, u)
+        c = sound_speed_of(eos, rho, P)
+        G = shear_modulus(strength)
+        if G > 0.0:
+            c = np.sqrt(c * c + 4.0 / 3.0 * G / rho)  # eq 415
+        sound_speed[i] = c
+        if balsara is not None:
+            size, curl = abs(div_v[i]), _curl(dim, velocity_gradient, i)
+            # the support is 2 d
+            balsara[i] = size / (size + curl + 2.0 * SOFTENING * c / support[i])
+        if pressure is not None:
+            pressure[i] = P
+        if stress is not None:
+            _return(
+                strength, dim, predicted_stress, velocity_gradient, div_v, plastic_strain, u, i,
+                False,
+            )  # fmt: skip
+            for a in range(D):
+                for b in range(D):
+                    stress[a, b, i] = predicted_stress[a, b, i] - (P if a == b else 0.0)
+                    # Hooke's law and, in the antisymmetric part, the spin: `rotation`
+                    L_ab, L_ba = velocity_gradient[a, b, i], velocity_gradient[b, a, i]
+                    trace = div_v[i] / 3.0 if a == b else 0.0
+                    stress_rate[a, b, i] = 2.0 * G * (0.5 * (L_ab + L_ba) - trace) + 0.5 * (
+                        L_ab - L_ba
+                    )
+            if tension is not None:
+                tensile(dim, models.tensile_correction, stress, i, axes, tension)
+
+
+@njit(**COMPILED)
+def yielded(
+    first, last, dim, models, neighbours, energy, velocity_gradient, div_v, number, stress,
+    plastic_strain,
+):  # fmt: skip
+    """Move the corrected deviatoric stress (D, D, N) to the yield surface (eqs 434-435).
+
+    For superblocks [first, last). Adds to plastic_strain (N,).
+    """
+    lists = neighbours.lists
+    i_end = min(lists.first[last] * BLOCK, energy.size)
+    for i in range(lists.first[first] * BLOCK, i_end):
+        if number is not None and number[i] != models.number:
+            continue
+        _return(
+            models.strength, dim, stress, velocity_gradient, div_v, plastic_strain, energy[i], i,
+            True,
+        )  # fmt: skip
+
+
+def shear_modulus(strength):
+    """Return G, 0 for a fluid."""
+
+
+@overload(shear_modulus, jit_options=INLINED)  # type: ignore[arg-type]
+def _shear_modulus(strength):
+    if _is_none(strength):
+        return lambda strength: 0.0
+    return lambda strength: strength.shear_modulus
+
+
+def _return(strength, dim, S, velocity_gradient, div_v, plastic_strain, u, i, is_final):
+    """Move S (D, D, N) of particle i to the yield surface; add its plastic strain if `is_final`."""
+
+
+@overload(_return, jit_options=INLINED)  # type: ignore[arg-type]
+def _radial_return(strength, dim, S, velocity_gradient, div_v, plastic_strain, u, i, is_final):
+    def nothing(strength, dim, S, velocity_gradient, div_v, plastic_strain, u, i, is_final):
+        return
+
+    def by_radius(strength, dim, S, velocity_gradient, div_v, plastic_strain, u, i, is_final):
+        rate = _strain_rate(dim, velocity_gradient, div_v[i], i)
+        size = equivalent_stress(dim, S, i)
+        factor, more = returned(strength, size, plastic_strain[i], rate, u)
+        for a in range(len(dim)):
+            for b in range(len(dim)):
+                S[a, b, i] *= factor
+        if is_final:
+            plastic_strain[i] += more
+
+    return by_radius if not _is_none(strength) and strength.instance_class.yields else nothing
+
+
+def _is_none(kind) -> bool:
+    return isinstance(kind, types.NoneType | types.Omitted)
+
+
+@njit(**INLINED)
+def _strain_rate(dim, velocity_gradient, divergence, i):
+    """Return the equivalent rate of strain (2/3 e : e)^1/2, e the deviator of the rate of strain.
+
+    The directions that the scene lacks are not strained.
+    """
+    D = len(dim)
+    squares = (3 - D) * (divergence / 3.0) ** 2
+    for a in range(D):
+        for b in range(D):
+            rate = 0.5 * (velocity_gradient[a, b, i] + velocity_gradient[b, a, i])
+            rate -= divergence / 3.0 if a == b else 0.0
+            squares += rate * rate
+    return np.sqrt(2.0 / 3.0 * squares)
+
+
+@njit(**INLINED)
+def _curl(dim, velocity_gradient, i):
+    """Return the modulus of the curl of the velocity."""
+    squares = 0.0
+    for a in range(len(dim)):
+        for b in range(a):
+            squares += (velocity_gradient[a, b, i] - velocity_gradient[b, a, i]) ** 2
+    return np.sqrt(squares)
