@@ -1,4 +1,4 @@
-"""Shocks of uniaxial strain in a solid with a linear Us-up law, Mie-Grueneisen energy and strength.
+"""Shocks of uniaxial strain in solids: linear shock speed, Mie-Grueneisen energy, strength.
 
 Davison (2008), Fundamentals of Shock Wave Propagation in Solids. The material ahead is at rest
 without stress at density rho_0, and the waves run towards +x. Stresses are positive in compression:
@@ -28,12 +28,12 @@ class Material(NamedTuple):
 
     @property
     def yield_deviator(self) -> float:
-        """Largest deviator in uniaxial strain, two thirds of the yield stress (eq 443)."""
+        """Largest deviator in uniaxial strain, two thirds of the yield stress (eq 442)."""
         return 2.0 / 3.0 * self.yield_stress if self.shear_modulus > 0.0 else 0.0
 
     @property
     def yield_compression(self) -> float:
-        """1 - rho_0/rho at which the material yields; 1 if it never does (eq 444)."""
+        """1 - rho_0/rho at which the material yields; 1 if it never does (eq 443)."""
         if self.shear_modulus == 0.0:
             return 0.0
         return -math.expm1(-0.5 * self.yield_stress / self.shear_modulus)
@@ -61,24 +61,24 @@ class Front(NamedTuple):
 
 
 def longitudinal_speed(bulk_modulus: float, shear_modulus: float, density: float) -> float:
-    """Return the speed of small longitudinal waves in uniaxial strain (eq 446)."""
+    """Return the speed of small longitudinal waves in uniaxial strain (eq 415)."""
     return math.sqrt((bulk_modulus + 4.0 / 3.0 * shear_modulus) / density)
 
 
 def deviator(material: Material, compression: float) -> float:
-    """Return the deviator after compression to 1 - rho_0/rho, never reversed (eq 443)."""
+    """Return the deviator after compression to 1 - rho_0/rho, never reversed (eq 442)."""
     if compression >= material.yield_compression:
         return material.yield_deviator
     return -4.0 / 3.0 * material.shear_modulus * math.log1p(-compression)
 
 
 def behind(material: Material, ahead: Medium, compression: float) -> Front:
-    """Return the shock that compresses `ahead` to 1 - rho_0/rho = `compression` (eqs 440-443)."""
+    """Return the shock that compresses `ahead` to 1 - rho_0/rho = `compression` (eqs 422 and 440-442)."""
     rho_0, _, _, gruneisen = material[:4]
     on_hugoniot = _hugoniot_pressure(material, compression)
     s = deviator(material, compression)
     squeezed = (compression - 1.0 + rho_0 / ahead.density) / rho_0  # decrease of 1/rho
-    # eq 441 is linear in the energy, and eq 442 in the pressure, so both are solved directly
+    # eq 440 is linear in the energy, and eq 441 in the pressure, so both are solved directly
     cold = on_hugoniot * (1.0 - 0.5 * gruneisen * compression)
     energy = ahead.internal_energy + 0.5 * (ahead.stress + s) * squeezed
     pressure = (cold + gruneisen * rho_0 * energy) / (1.0 - 0.5 * gruneisen * rho_0 * squeezed)
@@ -90,14 +90,14 @@ def behind(material: Material, ahead: Medium, compression: float) -> Front:
 
 
 def elastic_limit(material: Material) -> Front | None:
-    """Return the elastic precursor up to the Hugoniot elastic limit (eq 445); None without one."""
+    """Return the elastic precursor up to the Hugoniot elastic limit (eq 444); None without one."""
     if not 0.0 < material.yield_compression < largest_compression(material):
         return None
     return behind(material, at_rest(material), material.yield_compression)
 
 
 def fronts(material: Material, speed: float) -> tuple[Front, ...]:
-    """Return the shocks of material that is brought to `speed`, the fastest first (eq 445).
+    """Return the shocks of material that is brought to `speed`, the fastest first (eq 444).
 
     One shock, or an elastic precursor and a plastic shock where the latter is slower. Raises
     ValueError for a speed that is not positive.
@@ -119,7 +119,7 @@ def at_rest(material: Material) -> Medium:
 
 
 def largest_compression(material: Material) -> float:
-    """Return the 1 - rho_0/rho at which the pressure behind a shock diverges (eqs 440 and 441)."""
+    """Return the 1 - rho_0/rho at which the pressure behind a shock diverges (eqs 422 and 440)."""
     return min(1.0, 1.0 / max(material.slope, 1e-9), 2.0 / max(material.gruneisen, 1e-9))
 
 
@@ -136,7 +136,7 @@ def at(found: tuple[Front, ...], ahead: Medium, xi: np.ndarray) -> Medium:
 
 
 def _hugoniot_pressure(material: Material, compression: float) -> float:
-    """Return the pressure on the Hugoniot curve of the material without strength (eq 440)."""
+    """Return the pressure on the Hugoniot curve of the material without strength (eq 422)."""
     rho_0, c_0, slope = material[:3]
     return rho_0 * c_0**2 * compression / (1.0 - slope * compression) ** 2
 

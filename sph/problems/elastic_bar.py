@@ -1,8 +1,8 @@
 """Standing longitudinal wave in an elastic bar, in uniaxial strain, in 1-D to 3-D.
 
 The bar has free ends, or is periodic. It is periodic along y and z, so that the strain is uniaxial
-in every dimension and the speed of the wave is that of eq 446; a bar with free sides would be
-slower. The initial state has the velocity of the wave and no strain (eq 447).
+in every dimension and the speed of the wave is that of eq 415; a bar with free sides would be
+slower. The initial state has the velocity of the wave and no strain (eq 445).
 
 The wave speed comes from the frequency of the mode in the history. On a lattice, gradients of
 correction orders -1 and 0 are g times the true ones, and long waves run at g times their speed: at
@@ -122,7 +122,7 @@ class Problem(base.Problem):
         return self.mode * math.pi / float(self.box[0, 1] - self.box[0, 0])
 
     def wave_speed(self, eos) -> float:
-        """Return the speed of longitudinal waves in uniaxial strain (eq 446)."""
+        """Return the speed of longitudinal waves in uniaxial strain (eq 415)."""
         bulk = eos.rho_0 * float(eos.sound_speed(eos.rho_0, 0.0)) ** 2
         return solid_shocks.longitudinal_speed(bulk, self.shear_modulus, eos.rho_0)
 
@@ -135,7 +135,7 @@ class Problem(base.Problem):
         return base.InitialState(position, velocity, *own)
 
     def exact(self, eos, time: float, position: np.ndarray) -> dict[str, np.ndarray]:
-        """Return the wave of eq 447 at (D, N) positions, to first order in the amplitude.
+        """Return the wave of eq 445 at (D, N) positions, to first order in the amplitude.
 
         internal_energy: the elastic energy, of second order. "stress": -sigma_xx (N,).
         """
@@ -173,14 +173,14 @@ class Problem(base.Problem):
         return {"mode_velocity": float((shape * particles.velocity[0]).sum() / own)}
 
     def theory(self, eos, times: np.ndarray) -> dict[str, np.ndarray]:
-        """Return the velocity of the mode without damping (eq 447)."""
+        """Return the velocity of the mode without damping (eq 445)."""
         speed = self.wave_speed(eos)
         return {"mode_velocity": self.amplitude * speed * np.cos(self.wavenumber * speed * times)}
 
     def over_time(self, eos, history: dict[str, np.ndarray]) -> dict[str, float]:
         """Return the wave speed from the frequency of the mode, its error, and the damping.
 
-        wave_speed_error: relative to eq 446; wave_speed_deviation: its absolute value;
+        wave_speed_error: relative to eq 415; wave_speed_deviation: its absolute value;
         mode_damping: the rate at which the amplitude falls, in units of the angular frequency.
         Empty before one and a half periods.
         """

@@ -1,6 +1,6 @@
-"""Symmetric impact of two elastic-plastic plates: an elastic precursor, and a slower plastic shock.
+"""Impact of two elastic-plastic plates: an elastic precursor, and a slower plastic shock.
 
-Material between the two fronts is at the Hugoniot elastic limit (eqs 443-445). The problem is that
+Material between the two fronts is at the Hugoniot elastic limit (eqs 442-444). The problem is that
 of `flyer_plate` with strength and at lower speed.
 """
 

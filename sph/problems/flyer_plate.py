@@ -1,10 +1,10 @@
 """Symmetric impact of two plates along x, in 1-D to 3-D.
 
 The plates, at speeds +speed and -speed, touch at the middle of the domain at t = 0. A strong shock
-runs into each plate and leaves the material behind it at rest; it has an exact solution for a
-material whose shock speed is linear in the jump of velocity (eqs 440-442 and 448). physics.strength
-adds an elastic precursor (eqs 443-445). The rear sides of the plates are free, and the plates are
-periodic along y and z.
+runs into each plate and leaves the material behind it at rest. The shock has an exact solution for
+a material whose shock speed is linear in the jump of velocity (eqs 422, 440, 441 and 446);
+physics.strength adds an elastic precursor (eqs 442-444). The rear sides of the plates are free, and
+the plates are periodic along y and z.
 
 On a lattice, gradients of correction orders -1 and 0 are g times the true ones, and shocks run at
 about g times their speed: at physics.spacing_ratio = 1.2, g is 1.0205 in 1-D at order 0, at 2.0 it
@@ -123,7 +123,7 @@ class Problem(base.Problem):
         return super().departs(physics)
 
     def exact(self, eos, time: float, position: np.ndarray) -> dict[str, np.ndarray] | None:
-        """Return the waves of eq 448 at (D, N) positions, with -sigma_xx (N,) as "stress"."""
+        """Return the waves of eq 446 at (D, N) positions, with -sigma_xx (N,) as "stress"."""
         if self._material is None:
             return None
         offset = position[0] - self.centre[0]

@@ -75,6 +75,7 @@ class Continuum(Formulation):
             "neighbours is 1; 1 for exact gradients of linear fields, also at free surfaces",
             kind=Literal[-1, 0, 1],
             default=0,
+            restart="refused",  # order 1 has a column of its own in the history
         ),
         Key("q_a", "coefficient of the quadratic artificial viscosity", kind=float, default=2.0,
             at_least=0.0),
@@ -177,7 +178,7 @@ class Continuum(Formulation):
         found += [Field("stress", rank=2, stored=False)]
         found += [PLASTIC_STRAIN] * self.yields
         if self.corrects_tension:
-            found += [Field("initial_support", above=0.0)]
+            found += [Field("initial_support", remade=True, above=0.0)]
             found += [Field("tension", rank=2, stored=False)]
         return tuple(found)
 
@@ -264,6 +265,10 @@ class Continuum(Formulation):
         if self.corrects_tension:
             spacing = (state.mass / state.density) ** (1.0 / self.dimension)
             state.initial_support[:] = SUPPORT_RATIO * self.spacing_ratio * spacing
+
+    def remake(self, state, missing):
+        if "initial_support" in missing:  # the density of a solid has changed little
+            self.start(state)
 
     def pressure(self, state):
         return self._by_material(state, lambda one, rho, u: one.eos.pressure(rho, u))

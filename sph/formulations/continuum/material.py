@@ -1,4 +1,4 @@
-"""Constitutive laws, once per particle: stress and sound speed from density, energy and strain.
+"""Constitutive laws, once per particle: stress and sound speed from density and strain.
 
 Each material of a scene has its own pass, which leaves the particles of other materials alone.
 """

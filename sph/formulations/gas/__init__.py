@@ -121,7 +121,14 @@ class Gas(Formulation):
     @classmethod
     def issues(cls, physics, problem):
         scheme = registry.model(SCHEMES, physics.scheme)
-        if scheme.sums_pressure and not is_ideal(physics.eos_model()):
+        eos = physics.eos_model()
+        if eos.under_tension:
+            return [(
+                "eos", f"{eos.name} may have a negative pressure, which the gas formulation does "
+                'not take. Try: physics.formulation = "continuum", or the equation of state '
+                "ideal_gas or stiffened_gas"
+            )]  # fmt: skip
+        if scheme.sums_pressure and not is_ideal(eos):
             return [("scheme", f"expected an ideal gas, not {physics.shown('eos')}")]
         return []
 

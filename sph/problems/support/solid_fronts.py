@@ -6,7 +6,7 @@ import numpy as np
 
 from sph.exact.solid_shocks import Front, Material
 
-HUGONIOT = ("rho_0", "c_0", "slope", "gruneisen")  # what eqs 440 and 441 need of an eos
+HUGONIOT = ("rho_0", "c_0", "slope", "gruneisen")  # what eqs 422 and 440 need of an eos
 # Plateaus are measured without a fifth at either end: there are the smeared fronts and, where the
 # plates touch, the excess of heat of the start of the run (wall heating).
 MARGIN = 0.2

@@ -1,4 +1,4 @@
-"""What problems of solids share: checks of [physics], a steel, box, initial fields, and stress."""
+"""What problems of solids share: checks of [physics], a steel, box, initial state, stress."""
 
 import numpy as np
 
