@@ -4,7 +4,7 @@ import numpy as np
 
 from sph.analysis import truth
 from sph.config import Config
-from sph.problems.support import solids
+from sph.problems.support import uniaxial
 from sph.summary import AbsoluteNorms, Errors, Norms
 
 FIELDS = ("density", "velocity", "pressure", "internal_energy")
@@ -68,7 +68,7 @@ def against_exact(config: Config, time: float, particles, pressure) -> Errors | 
         "internal_energy": particles.internal_energy,
     }
     if "stress" in exact:
-        state["stress"] = solids.compressive_stress(particles, pressure)
+        state["stress"] = uniaxial.compressive_stress(particles, pressure)
     fields = by_field(state, exact, particles.mass / particles.density, inside)
     return {
         "against": problem.truth[0],

@@ -73,7 +73,7 @@ def deviator(material: Material, compression: float) -> float:
 
 
 def behind(material: Material, ahead: Medium, compression: float) -> Front:
-    """Return the shock that compresses `ahead` to 1 - rho_0/rho = `compression` (eqs 422 and 440-442)."""
+    """Return the shock from `ahead` to a `compression` 1 - rho_0/rho (eqs 422 and 440-442)."""
     rho_0, _, _, gruneisen = material[:4]
     on_hugoniot = _hugoniot_pressure(material, compression)
     s = deviator(material, compression)

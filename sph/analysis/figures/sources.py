@@ -12,7 +12,7 @@ from sph.domain import Domain
 from sph.errors import FileError
 from sph.output import checkpoint, same_run
 from sph.output.run_directory import RunDirectory, find
-from sph.problems.support import solids
+from sph.problems.support import uniaxial
 
 
 @dataclass(frozen=True)
@@ -147,7 +147,7 @@ class State:
         if name == "pressure":
             return self.checkpoint.pressure
         if name == "stress":
-            return solids.compressive_stress(self.particles, self.checkpoint.pressure)
+            return uniaxial.compressive_stress(self.particles, self.checkpoint.pressure)
         return getattr(self.particles, name)
 
     def exact(self, position: np.ndarray) -> dict[str, np.ndarray] | None:

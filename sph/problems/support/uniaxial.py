@@ -1,4 +1,4 @@
-"""What problems of solids share: checks of [physics], a steel, box, initial state, stress."""
+"""Plane waves along x in solids: checks of [physics], a steel, box, initial state, stress."""
 
 import numpy as np
 
@@ -27,6 +27,8 @@ def check_physics(physics) -> None:
             f'physics.formulation = "{physics.formulation}": expected "continuum", which has '
             'solids. Try: physics.formulation = "continuum"'
         )
+    if physics.materials is not None:
+        raise ValueError("physics.materials is given: expected one material in this problem")
     if not hasattr(physics.eos_model(), "rho_0"):
         raise ValueError(
             f"physics.eos = {physics.shown('eos')}: expected an equation of state of a solid or "
