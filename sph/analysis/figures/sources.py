@@ -162,11 +162,9 @@ class State:
         return self.checkpoint.config.physics.formulation == "continuum"
 
     def scalar(self, name: str) -> np.ndarray:
-<<<<<<< HEAD
-        """(N,) density, pressure, internal_energy, plastic_strain, speed |v|, or von_mises."""
-=======
-        """(N,) density, pressure, internal_energy, speed |v|, or stress -sigma_xx of a solid."""
->>>>>>> wip-shocks
+        """Return a quantity (N,): density, pressure, internal_energy, plastic_strain, speed |v|,
+        von_mises, or stress, which is -sigma_xx of a solid.
+        """
         if name == "speed":
             return np.linalg.norm(self.particles.velocity, axis=0)
         if name == "von_mises":

@@ -155,7 +155,7 @@ class Continuum(Formulation):
         self.evolved = self._evolved()
         self.passes = self._passes()
         self.columns = ("corrections_failed",) if self.order == 1 else ()
-        # `check` only names the particle: a NaN is in the sums of the step, which are always checked
+        # `check` only names the particle: a NaN is in the sums of the step, always checked
         self.idle = ("check",) if self.order == 1 else ("check", "sums")
 
     @classmethod

@@ -63,15 +63,9 @@ ENDS = {
     "keplerian_ring": ("keplerian_ring", (), 0.15 / math.sqrt(5e-6 / 3), "ring's edges"),
 }  # fmt: skip
 FOR_EVER = {
-<<<<<<< HEAD
-    "blast_waves", "blob", "bodies", "contrast", "expanding_ball", "gresho", "kelvin_helmholtz",
-    "kelvin_helmholtz_smooth", "particles", "polytrope", "rayleigh_taylor", "rubber_rings",
-    "square", "taylor_bar", "uniform", "yee",
-=======
-    "blast_waves", "blob", "contrast", "elastic_bar", "expanding_ball", "gresho",
+    "blast_waves", "blob", "bodies", "contrast", "elastic_bar", "expanding_ball", "gresho",
     "kelvin_helmholtz", "kelvin_helmholtz_smooth", "particles", "polytrope", "rayleigh_taylor",
-    "square", "uniform", "yee",
->>>>>>> wip-shocks
+    "rubber_rings", "square", "taylor_bar", "uniform", "yee",
 }  # fmt: skip
 
 

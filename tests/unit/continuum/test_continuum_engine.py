@@ -345,9 +345,9 @@ def scene_of(case, given, end):
     if len(case.materials) > 1:
         laws = {"materials": {f"m{k}": one for k, one in enumerate(case.materials)}}
     settings = physics.table("continuum")(
-        formulation="continuum", **laws, kernel=case.kernel, spacing_ratio=case.spacing_ratio, correction=case.order,
-        q_a=1.7, q_b=0.8, balsara=case.balsara, tensile_correction=case.tensile,
-        allow_pairing=True,
+        formulation="continuum", **laws, kernel=case.kernel, spacing_ratio=case.spacing_ratio,
+        correction=case.order, q_a=1.7, q_b=0.8, balsara=case.balsara,
+        tensile_correction=case.tensile,
     )  # fmt: skip
     return Scene(
         config.Config(
