@@ -42,5 +42,9 @@ class Formulation(Part):
         """Return the speed of sound (N,) of the state at the end of a step."""
         return self.eos.sound_speed(state.density, self.pressure(state))
 
+    def pieces(self, state: State) -> Any:
+        """Return solid bodies and their connected pieces, or None if there are no solids."""
+        return None
+
 
 BASE = Formulation

@@ -110,6 +110,9 @@ class Problem(base.Problem):
         }
 
     def departs(self, physics) -> str | None:
+        field = registry.model("sph.parts.external", physics.external)
+        if getattr(field, "g", None) != [0.0, -self._g]:
+            return "the exact pressure is for a uniform field, but physics.external is another"
         return base.other_physics(physics, besides="external")
 
     def diagnostics(self, particles) -> dict[str, float]:
