@@ -9,6 +9,7 @@ import numpy as np
 
 from sph import declarations, parts, registry, simd
 from sph.config import Config
+from sph.config.toml_text import value_text
 from sph.domain import Domain
 from sph.errors import ConfigError
 from sph.formulations import Formulation
@@ -166,13 +167,30 @@ class Scene:
         problem = self.config.problem
         try:
             with np.errstate(all="ignore"):
-                return problem.initial(self.eos)
+                found = problem.initial(self.eos)
+                return self._with_density(found) if self._evolves("density") else found
         except (ArithmeticError, ValueError) as error:
             raise ConfigError(
                 f"problem.name = {problem.name}: particles cannot be placed with these settings "
                 f"({error}).\nTry: numbers in [problem] closer to 1, and sides of problem.domain "
                 "of similar length."
             ) from error
+
+    def _evolves(self, name: str) -> bool:
+        return any(one.value == name for part in self.all_parts for one in part.evolved)
+
+    def _with_density(self, start: InitialState) -> InitialState:
+        """Return `start` with the density of the particles, which the formulation integrates."""
+        if "density" in start.others:
+            return start
+        exact = self.config.problem.exact(self.eos, 0.0, start.position)
+        if exact is None or not exact["density"].min() > 0.0:
+            raise ConfigError(
+                f"physics.formulation = {value_text(self.physics.formulation)}: it integrates the "
+                f"density in time, and problem.name = {self.config.problem.name} states no initial "
+                "density.\nTry: another problem, or another formulation."
+            )
+        return start._replace(others={**start.others, "density": exact["density"]})
 
     def described(self) -> tuple[list[str], list[str]]:
         """Return descriptions of the compiled physics, and of the omitted physics with reasons."""

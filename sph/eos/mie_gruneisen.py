@@ -1,9 +1,9 @@
-"""Mie-Grueneisen equation of state of solids, with shocks of speed c_0 + slope v (eqs 422-424).
+"""Mie-Grueneisen equation of state of solids (eqs 422-424).
 
-v is the jump of velocity at the shock. The reference is the exact Hugoniot curve of material at
-rho_0 without pressure and energy, with Gamma rho = Gamma_0 rho_0 constant. Below rho_0 the cold
-pressure is linear in the density. The continuum formulation only: the pressure is negative in
-tension.
+A shock has the speed c_0 + slope v, where v is the jump of velocity at the shock. The reference is
+the exact Hugoniot curve of material at rho_0 without pressure and energy, with Gamma rho =
+Gamma_0 rho_0 constant. Below rho_0 the cold pressure is linear in the density. The continuum
+formulation only: the pressure is negative in tension.
 
 The Hugoniot curve ends at the density rho_0/(1 - 1/slope), which no shock reaches. Pressure and
 speed of sound are NaN from there on, and the speed of sound is NaN where its square is negative (in

@@ -1,4 +1,4 @@
-"""Tait's law for liquids and stiff solids: the pressure depends on the density alone (eq 420).
+"""Tait's law for liquids and elastic solids: pressure from the density alone (eq 420).
 
 With gamma = 1 the law is linear, P = c_0^2 (rho - rho_0); gamma = 7 fits water (Cole 1948,
 Underwater Explosions, Princeton University Press). The continuum formulation only: the pressure is

@@ -1,12 +1,13 @@
 """Base class of all problems: the shared keys, and the methods that the program calls."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from types import MappingProxyType
 from typing import Any, ClassVar, Literal, NamedTuple
 
 import numpy as np
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field
+from pydantic_core import PydanticCustomError
 
 Boundary = Literal["periodic", "mirror", "open"]
 
@@ -38,6 +39,20 @@ class Limit(NamedTuple):
         return value >= self.bound if self.at_least else value <= self.bound
 
 
+class Fault(NamedTuple):
+    """An error in a key of [problem]: its path there, e.g. ("body", 2, "material"), and the text
+    that follows the key's name in the message.
+    """
+
+    path: tuple[str | int, ...]
+    text: str
+
+
+def refused(faults: Iterable[Fault]) -> PydanticCustomError:
+    """Return an error to raise in a validator, or in `Problem.under`, that names several keys."""
+    return PydanticCustomError("issues", "{issues}", {"issues": list(faults)})
+
+
 class Section(BaseModel):
     """A table of the configuration, with strict types, no unknown keys, and immutable.
 
@@ -63,6 +78,7 @@ class Problem(Section):
       truth      what `exact` returns, as a phrase and as a label in figures: an exact solution, or
                  a reference solution from another method
       profiled   whether figures show profiles over x or over the distance; otherwise, maps
+      profiles   the four fields of these profiles; solids have "stress", which is -sigma_xx
     """
 
     restart: ClassVar[str | None] = "refused"
@@ -73,6 +89,7 @@ class Problem(Section):
     swamped: ClassVar[dict[str, Limit]] = {}
     truth: ClassVar[tuple[str, str]] = ("the exact solution", "exact")
     profiled: ClassVar[bool] = True
+    profiles: ClassVar[tuple[str, ...]] = ("density", "velocity", "pressure", "internal_energy")
 
     name: str = Field(description="name of the problem; `sph list` shows all problems")
     dimension: int = Field(ge=1, le=3, description="number of space dimensions")
@@ -111,7 +128,8 @@ class Problem(Section):
         """Return the problem with what it takes from [physics], such as the constant G of gravity.
 
         The configuration calls this once. Raises ValueError, with a message that begins with a key
-        of [physics], if the problem cannot be set up under these physics.
+        of [physics], if the problem cannot be set up under these physics, or `refused` if keys of
+        [problem] do not match them.
         """
         return self
 
@@ -140,8 +158,8 @@ class Problem(Section):
     def exact(self, eos, time: float, position: np.ndarray) -> dict[str, np.ndarray] | None:
         """Return exact density (N,), velocity (D, N), pressure and internal_energy (N,), or None.
 
-        position: (D, N) points. Callers use `sph.analysis.truth`, which checks where the exact
-        solution is valid.
+        position: (D, N) points. Solids add "stress", -sigma_xx (N,). Callers use
+        `sph.analysis.truth`, which checks where the exact solution is valid.
         """
         return None
 

@@ -65,7 +65,8 @@ class Problem(base.Problem):
         energy = eos.internal_energy(DENSITY, _pressure(x))
         position = x[None]
         mass = np.full(self.n, DENSITY / self.n)
-        return base.InitialState(position, np.zeros_like(position), mass, energy)
+        density = {"density": np.full(self.n, DENSITY)}
+        return base.InitialState(position, np.zeros_like(position), mass, energy, density)
 
     def exact(self, eos, time: float, position: np.ndarray) -> dict[str, np.ndarray] | None:
         """Return the reference solution at (D, N) positions; None if the gas has no gamma law."""

@@ -66,7 +66,7 @@ class Problem(base.Problem):
         density = np.where(is_slab, *DENSITY[::-1])
         mass = np.full(n, sum(DENSITY) / 2 / n)
         energy = eos.internal_energy(density, np.full(n, PRESSURE))
-        return base.InitialState(position, velocity, mass, energy)
+        return base.InitialState(position, velocity, mass, energy, {"density": density})
 
     def diagnostics(self, particles) -> dict[str, float]:
         """Return mode_amplitude, of the velocity away from the slab."""

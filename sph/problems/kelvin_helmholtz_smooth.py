@@ -66,9 +66,8 @@ class Problem(base.Problem):
         density = _ramped(*DENSITY, y)
         velocity = np.stack([_ramped(*SPEED, y), PERTURBATION * np.sin(2 * np.pi * x / WAVELENGTH)])
         mass = density / y.size  # the box has volume 1
-        return base.InitialState(
-            position, velocity, mass, eos.internal_energy(density, np.full(y.size, PRESSURE))
-        )
+        energy = eos.internal_energy(density, np.full(y.size, PRESSURE))
+        return base.InitialState(position, velocity, mass, energy, {"density": density})
 
     def diagnostics(self, particles) -> dict[str, float]:
         x, y = particles.position

@@ -89,7 +89,8 @@ class Problem(base.Problem):
         mass = self.density * np.prod(self.box[:, 1] - self.box[:, 0]) / n
         energy = np.full(n, eos.internal_energy(self.density, self.background_pressure))
         energy[self._nearest(position)] += self.energy / (self.energy_particles * mass)
-        return base.InitialState(position, np.zeros_like(position), np.full(n, mass), energy)
+        still, density = np.zeros_like(position), {"density": np.full(n, self.density)}
+        return base.InitialState(position, still, np.full(n, mass), energy, density)
 
     def exact(self, eos, time: float, position: np.ndarray) -> dict[str, np.ndarray]:
         """Return the self-similar blast at (D, N) positions, with the cold gas ahead of it."""

@@ -1,4 +1,4 @@
-"""Tensors in compiled code: tuples with one component after another, each a number or a `Vec`.
+"""Tensors in compiled code: tuples with a number or a `Vec` for each component.
 
 A symmetric tensor has the D(D + 1)/2 components of its upper triangle, row by row. A full tensor
 has D^2 components, row by row. Functions of `sph.simd.spatial` that work on each component (plus,

@@ -51,7 +51,12 @@ def test_equations_of_state_with_exact_solutions():
 PARAMETERS = {
     "ideal_gas": ({"gamma": 5 / 3}, ENERGY),
     "stiffened_gas": ({"gamma": 4.4, "p_inf": 0.3}, np.array([3.0, 1.0, 0.2])),
-}
+    # densities below, at and above rho_0; the largest is below the end of the Hugoniot curve
+    "mie_gruneisen": (
+        {"rho_0": 2.0, "c_0": 1.5, "slope": 1.4, "gruneisen": 2.0}, np.array([3.0, 1.0, 0.2])
+    ),
+    "tait": ({"rho_0": 1.0, "c_0": 1.5, "gamma": 2.0}, np.zeros(3)),  # u does not enter
+}  # fmt: skip
 
 
 @pytest.mark.parametrize("name", registry.names("sph.eos"))

@@ -180,7 +180,7 @@ BROKEN_PARTS = {
         PART.replace("kind=float", 'models="sph.parts.nowhere"'), "sph.parts.nowhere has none"
     ),
     "a default model": (
-        PART.replace("kind=float", 'models="sph.eos", default_model="x"'), "has ideal_gas, stiff"
+        PART.replace("kind=float", 'models="sph.eos", default_model="x"'), "has ideal_gas, mie_gr"
     ),
     "a formulation": (with_body('formulations = ("gaz",)'), "'gaz' is none, expected one of gas"),
     "another object": (PART.replace("cls()", "cls"), "expected a Mine or None"),

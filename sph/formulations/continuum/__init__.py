@@ -27,6 +27,7 @@ DEVIATOR = Field(
     rank=2,
     public=Public("DeviatoricStressTensors", -1, 1, -2, -5, "Deviator of the stress tensor"),
 )
+STRESS = Public("StressTensors", -1, 1, -2, -5, "Stress tensor, positive in tension")
 PLASTIC_STRAIN = Field(
     "plastic_strain",
     at_least=0.0,
@@ -76,6 +77,7 @@ class Continuum(Formulation):
             "neighbours is 1; 1 for exact gradients of linear fields, also at free surfaces",
             kind=Literal[-1, 0, 1],
             default=0,
+            restart="refused",  # order 1 has a column of its own in the history
         ),
         Key("q_a", "coefficient of the quadratic artificial viscosity", kind=float, default=2.0,
             at_least=0.0),
@@ -153,11 +155,23 @@ class Continuum(Formulation):
         self.evolved = self._evolved()
         self.passes = self._passes()
         self.columns = ("corrections_failed",) if self.order == 1 else ()
-        self.idle = () if self.order == 1 else ("sums",)
+        # `check` only names the particle: a NaN is in the sums of the step, always checked
+        self.idle = ("check",) if self.order == 1 else ("check", "sums")
 
     @classmethod
     def of(cls, scene):
         return cls(scene)
+
+    @classmethod
+    def issues(cls, physics, problem):
+        found = []
+        if physics.materials is not None and not physics.materials:
+            found.append(("materials", "expected at least one material"))
+        for key in ("eos", "strength"):
+            if physics.materials and getattr(physics, key) is not None:
+                text = "expected it in the tables of physics.materials, which are given"
+                found.append((key, text))
+        return found
 
     def _fields(self) -> tuple[Field, ...]:
         # elastic energy released in tension may exceed the heat
@@ -180,7 +194,7 @@ class Continuum(Formulation):
         found += [Field("stress", rank=2, stored=False)]
         found += [PLASTIC_STRAIN] * self.yields
         if self.corrects_tension:
-            found += [Field("initial_support", above=0.0)]
+            found += [Field("initial_support", remade=True, above=0.0)]
             found += [Field("tension", rank=2, stored=False)]
         return tuple(found)
 
@@ -275,6 +289,10 @@ class Continuum(Formulation):
         kind = np.zeros(state.number) if material is None else material
         pieces.start(state, support, self.domain, strengths[kind.astype(int)])
 
+    def remake(self, state, missing):
+        if "initial_support" in missing:  # the density of a solid has changed little
+            self.start(state)
+
     def pressure(self, state):
         return self._by_material(state, lambda one, rho, u: one.eos.pressure(rho, u))
 
@@ -287,12 +305,16 @@ class Continuum(Formulation):
         return self._by_material(state, of)
 
     def stress(self, state) -> np.ndarray:
-        """Return the stress tensor (D, D, N) of the state at the end of a step."""
-        deviator = state.get("deviatoric_stress")
-        shape = (self.dimension, self.dimension, state.number)
-        found = np.zeros(shape) if deviator is None else deviator.copy()
-        for d in range(self.dimension):
-            found[d, d] -= self.pressure(state)
+        """Return the stress tensor (3, 3, N) of the state at the end of a step.
+
+        Directions that the scene lacks are those of plane strain (2-D) and uniaxial strain (1-D).
+        """
+        D, found = self.dimension, np.zeros((3, 3, state.number))
+        if self.is_solid:
+            found[:D, :D] = state.deviatoric_stress
+            for d in range(D, 3):  # S stays traceless
+                found[d, d] = -np.trace(state.deviatoric_stress) / (3 - D)
+        found[np.arange(3), np.arange(3)] -= self.pressure(state)
         return found
 
     def _by_material(self, state, formula: Any) -> np.ndarray:
@@ -314,6 +336,12 @@ class Continuum(Formulation):
             return {}
         # the kernel has a gradient of its own only there
         return {"corrections_failed": float(state.kernel_gradient.any(axis=0).sum())}
+
+    def derived(self, state):
+        found = super().derived(state)
+        if self.is_solid:
+            found.append((STRESS, self.stress(state)))
+        return found
 
     # --- words ---
 

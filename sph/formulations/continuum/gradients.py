@@ -284,6 +284,10 @@ def inverted(matrix):
         determinant = a * inverse[0] + b * inverse[1] + c * inverse[2]
         for k in range(6):
             other += inverse[k] ** 2 * (1.0 if k == 0 or k == 3 or k == 5 else 2.0)
+        # Of neighbours on a line, such as a lone pair, adjugate and determinant are both round-off,
+        # and their ratio looks regular. The adjugate has the two largest of the singular values.
+        if not norm * norm < SINGULAR * SINGULAR * other:
+            return False
     # condition number |M| |M^-1|, squared, with M^-1 = adjugate/determinant
     if not norm * other < (SINGULAR * determinant) ** 2:
         return False

@@ -1,4 +1,4 @@
-"""Radial return: scales a deviatoric stress beyond the yield surface back to it (eqs 434-435).
+"""Radial return of a deviatoric stress to the yield surface (eqs 434-435).
 
 Wilkins, M. L. (1964), Methods Comput. Phys. 3, 211. All three normal components count, also those
 that are not stored: in 2-D S_zz = -(S_xx + S_yy), in 1-D S_yy = S_zz = -S_xx/2.

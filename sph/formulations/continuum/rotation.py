@@ -1,4 +1,4 @@
-"""Integration of the deviatoric stress, turned by the exact rotation of each step (eqs 430-431).
+"""Integration of the deviatoric stress, with the exact rotation of a step (eqs 430-431).
 
 The rate of the stress (D, D) holds two things: its symmetric part is the rate by Hooke's law, and
 its antisymmetric part the spin of the material, (L - L^T)/2 with L the velocity gradient. The usual

@@ -54,6 +54,13 @@ class Gas(Formulation):
             above=0.0,
         ),
         Key(
+            "allow_pairing",
+            "allow a spline kernel at values of eta for which its particles form close pairs (the "
+            "pairing instability)",
+            kind=bool,
+            default=False,
+        ),
+        Key(
             "scheme",
             "pair force: how a pair of neighbours accelerate each other and exchange energy; "
             "`sph list` describes each",
@@ -79,6 +86,7 @@ class Gas(Formulation):
         ),
     )
     neighbours_key = "physics.eta"
+    individual_steps = True
     roles = ("viscosity", "balsara", "exchange")
     reserves = ("pressure", "energy_shift", "div_v", "curl_v")
     evolved = (Evolved("internal_energy", "energy_rate", "predicted_energy", POSITIVE),)
@@ -120,8 +128,17 @@ class Gas(Formulation):
 
     @classmethod
     def issues(cls, physics, problem):
+        if physics.materials:
+            return [("materials", 'expected physics.formulation = "continuum"')]
         scheme = registry.model(SCHEMES, physics.scheme)
-        if scheme.sums_pressure and not is_ideal(physics.eos_model()):
+        eos = physics.eos_model()
+        if eos.under_tension:
+            return [(
+                "eos", f"{eos.name} may have a negative pressure, which the gas formulation does "
+                'not take. Try: physics.formulation = "continuum", or the equation of state '
+                "ideal_gas or stiffened_gas"
+            )]  # fmt: skip
+        if scheme.sums_pressure and not is_ideal(eos):
             return [("scheme", f"expected an ideal gas, not {physics.shown('eos')}")]
         return []
 

@@ -16,6 +16,8 @@ def required(physics, liquid: bool = False):
             f'physics.formulation = "{physics.formulation}": expected "continuum"; this problem '
             "needs an evolved density" + ("" if liquid else " and a strength")
         )
+    if physics.materials is not None:
+        raise ValueError("physics.materials is given: expected one material in this problem")
     eos, strength = physics.eos_model(), physics.strength_model()
     if not hasattr(eos, "c_0"):
         raise ValueError(

@@ -26,6 +26,15 @@ GRAVITY = ["problem.dimension=3", "physics.gravity={ G = 1.0 }"]  # not in 1-D
 
 PHYSICS = {name: physics.table(name) for name in registry.names(physics.FORMULATIONS, folders=True)}
 TABLES = {"physics": PHYSICS[physics.DEFAULT], **SECTIONS}
+WATER = 'physics.eos={ name = "tait", rho_0 = 1.0, c_0 = 1.0 }'
+CONTINUUM = f"""
+[problem]
+name = "uniform"
+[physics]
+formulation = "continuum"
+{WATER.removeprefix("physics.")}
+strength = {{ name = "elastic", shear_modulus = 1.0 }}
+"""
 
 # a changed value of every key beside [problem], by what a restart does with it
 FREE = ["time.end=0.3", "output.interval=0.1", "report.reference=fine", "run.threads=2",
@@ -41,8 +50,18 @@ REFUSED = ["physics.gamma=1.6", 'physics.eos={ name = "ideal_gas", gamma = 1.6 }
            "problem.n=61", "problem.density=2.0", "time.stepping=individual"]  # fmt: skip
 
 
-def changes(overrides, start=()):
-    before = configuration.from_text(START).override(start)
+# those of the formulation "continuum" only
+CONTINUUM_FREE = ["physics.allow_tearing=true"]
+CONTINUUM_RECORDED = ["physics.spacing_ratio=1.5", "physics.q_a=1.0", "physics.q_b=0.5",
+                      "physics.tensile_correction=0.3", "physics.balsara=false"]  # fmt: skip
+CONTINUUM_REFUSED = [
+    "physics.correction=1",
+    'physics.strength={ name = "elastic", shear_modulus = 2.0 }',
+]
+
+
+def changes(overrides, start=(), text=START):
+    before = configuration.from_text(text).override(start)
     return restarts.changes(before, before.override(overrides))
 
 
@@ -56,8 +75,14 @@ def test_every_key_has_a_class(name):
 def test_every_key_is_covered_by_these_tests():
     tried = {override.partition("=")[0] for override in FREE + RECORDED + REFUSED + GRAVITY}
     keys = {f"{name}.{key}" for name, table in TABLES.items() for key in table.model_fields}
-    assert len(PHYSICS) == 1  # so there is no other value to try of the key that names it
-    assert keys - {"physics.formulation"} <= tried
+    # a change of the formulation would change the other keys too
+    assert keys - {"physics.formulation", "physics.materials"} <= tried
+    tried |= {one.partition("=")[0] for one in CONTINUUM_FREE + CONTINUUM_RECORDED}
+    tried |= {"physics.correction", "physics.strength", "physics.materials"}  # CONTINUUM_REFUSED
+    assert restarts.class_of(PHYSICS["continuum"], "materials") == "refused"  # replaces the laws
+    assert {f"physics.{key}" for key in PHYSICS["continuum"].model_fields} - {
+        "physics.formulation"
+    } <= tried
     assert restarts.class_of(TABLES["physics"], "formulation") == "refused"
 
 
@@ -67,6 +92,19 @@ def test_restart_key_without_effect_is_free(override):
     assert [one.key for one in changed] == [override.partition("=")[0]]
     assert restarts.refusals(changed) == []
     assert restarts.lineage(7, 0.1, changed) == "restarted at step 7, t = 0.1"
+
+
+@pytest.mark.parametrize(
+    ("override", "rule"),
+    [(one, "free") for one in CONTINUUM_FREE]
+    + [(one, "recorded") for one in CONTINUUM_RECORDED]
+    + [(one, "refused") for one in CONTINUUM_REFUSED],
+)
+def test_restart_keys_of_continuum_have_their_class(override, rule):
+    (one,) = changes([override], text=CONTINUUM)
+    found = "recorded" if one.rule == "same kind" else one.rule
+    assert found == rule
+    assert bool(restarts.refusals([one])) == (rule == "refused")
 
 
 @pytest.mark.parametrize("override", RECORDED)

@@ -1,4 +1,4 @@
-"""Johnson-Cook solid: hardening with strain and strain rate, softening with temperature (eq 433).
+"""Johnson-Cook solid: hardening with strain and rate, softening with temperature (eq 433).
 
 Johnson & Cook (1983), Proc. 7th International Symposium on Ballistics, 541. The temperature follows
 from the internal energy with a constant specific heat; u = 0 is room temperature. From the melting
