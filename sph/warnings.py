@@ -141,7 +141,8 @@ def _paired(nearest: Nearest | None, neighbours: str) -> Iterator[Warning]:
 
 def _torn(found: Tearing | None) -> Iterator[Warning]:
     if found and found["pieces"] > found["bodies"]:
-        bodies = "1 solid body is" if found["bodies"] == 1 else f"{found['bodies']} solid bodies are"
+        number = found["bodies"]
+        bodies = "1 solid body is" if number == 1 else f"{number} solid bodies are"
         yield Warning(
             "torn",
             f"{bodies} in {found['pieces']} pieces. The equations contain no law of fracture, so "
