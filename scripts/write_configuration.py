@@ -6,7 +6,7 @@ python scripts/write_configuration.py
 from pathlib import Path
 
 from sph import config, registry
-from sph.config import restarts
+from sph.config import commented, physics, restarts
 from sph.config.sections import SECTIONS
 from sph.problems.base import Problem
 
@@ -41,7 +41,18 @@ def text() -> str:
         parts.append(f"## {name}\n\n```toml\n{_problem_table(page)}```\n")
     tables = pages["shock_tube"].removeprefix(_problem_table(pages["shock_tube"])).lstrip()
     parts.append(f"## {shared}\n\n```toml\n{tables}```\n")
+    for name in registry.names(physics.FORMULATIONS, folders=True):
+        if name != physics.DEFAULT:
+            parts.append(
+                f'## \\[physics] with formulation = "{name}"\n\n```toml\n{_physics(name)}```\n'
+            )
     return "\n".join(parts)
+
+
+def _physics(formulation: str) -> str:
+    """The table [physics] of a formulation, with its own defaults."""
+    of_it = f'[problem]\nname = "shock_tube"\n[physics]\nformulation = "{formulation}"\n'
+    return commented.text({"physics": config.from_text(of_it).physics})
 
 
 def _head() -> str:
@@ -61,7 +72,9 @@ def _problem_table(page: str) -> str:
     next_table = next(
         i for i, line in enumerate(lines) if line.startswith("[") and "[problem]" not in line
     )
-    return "".join(lines[: next_table - 1]).rstrip() + "\n"
+    while lines[next_table - 1].startswith("#"):
+        next_table -= 1
+    return "".join(lines[:next_table]).rstrip() + "\n"
 
 
 if __name__ == "__main__":

@@ -135,7 +135,8 @@ class Domain:
                 f"particle {particle} needs a support radius of {reach:.4g}, "
                 f"{reach / self.longest_reach:.3g} times the shortest side of the box, with more "
                 f"than {MOST_IMAGES} images of the box or {MOST_NEIGHBOURS} neighbours.\n"
-                "Try: a smaller physics.eta, more particles, or a domain wider along that side.",
+                "Try: fewer neighbours (physics.eta or, in the formulation continuum, "
+                "physics.spacing_ratio), more particles, or a domain wider along that side.",
                 particle,
             )
 

@@ -54,7 +54,7 @@ class Errors(TypedDict):
     reference: NotRequired[str]  # the run directory that the errors are against
     region: str  # where errors are taken, in words
     particles: int  # in that region
-    fields: dict[str, Norms]  # by density, velocity, pressure, internal_energy
+    fields: dict[str, Norms]  # by density, velocity, pressure, internal_energy, stress
 
 
 class Conservation(TypedDict):

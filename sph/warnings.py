@@ -38,14 +38,15 @@ def of_run(simulation, summary: Summary) -> list[Warning]:
     """Return the warnings of a run, from its final state and its summary."""
     config = simulation.scene.config
     problem, precision = config.problem, config.run.precision
+    neighbours = simulation.scene.formulation.neighbours_key
     return [
-        *_swamped(problem, summary),
-        *_energy(summary["conservation"]),
+        *_swamped(problem, summary, neighbours),
+        *_energy(summary["conservation"], neighbours),
         *_momentum(summary["conservation"], simulation.scene, MOMENTUM[precision]),
-        *_volume(summary["conservation"]),
+        *_volume(summary["conservation"], neighbours),
         *_held(simulation),
         *_resolution(simulation),
-        *_paired(summary["nearest"]),
+        *_paired(summary["nearest"], neighbours),
         *_limits(problem, summary, precision),
     ]
 
@@ -60,24 +61,24 @@ def kinds(summary: Mapping[str, object]) -> list[str]:
     return list(dict.fromkeys(str(one.get("kind")) for one in warned))
 
 
-def _swamped(problem, summary: Summary) -> Iterator[Warning]:
+def _swamped(problem, summary: Summary, neighbours: str) -> Iterator[Warning]:
     for name, limit in problem.swamped.items():
         value = figure(summary, name)
         if value is not None and not limit.holds(value):
             yield Warning(
                 "swamped",
                 f"the problem's signal is lost in numerical noise: {_beyond(name, value, limit)} "
-                "Try a larger physics.eta with a smoother physics.kernel, or more particles.",
+                f"Try a larger {neighbours} with a smoother physics.kernel, or more particles.",
             )
 
 
-def _energy(kept: Conservation) -> Iterator[Warning]:
+def _energy(kept: Conservation, neighbours: str) -> Iterator[Warning]:
     drift = kept["energy_drift_max"]
     if not drift <= DRIFT:
         yield Warning(
             "energy_drift",
             f"total energy drifted by {100 * drift:.2g} %, more than {100 * DRIFT:g} %. Try a "
-            "smaller physics.C or, where that does not help, a larger physics.eta.",
+            f"smaller physics.C or, where that does not help, a larger {neighbours}.",
         )
 
 
@@ -99,13 +100,13 @@ def _momentum(kept: Conservation, scene, most: float) -> Iterator[Warning]:
     )
 
 
-def _volume(kept: Conservation) -> Iterator[Warning]:
+def _volume(kept: Conservation, neighbours: str) -> Iterator[Warning]:
     ratio = kept["volume_ratio"]
     if ratio is not None and not abs(ratio - 1.0) <= VOLUME:
         yield Warning(
             "volume",
             f"the sum of m/rho is {ratio:.3g} of the box's volume, so densities are wrong by "
-            f"{100 * abs(1.0 / ratio - 1.0):.2g} % on average. Try a larger physics.eta or more "
+            f"{100 * abs(1.0 / ratio - 1.0):.2g} % on average. Try a larger {neighbours} or more "
             "particles.",
         )
 
@@ -126,14 +127,14 @@ def _resolution(simulation) -> Iterator[Warning]:
         yield Warning("resolution", text)
 
 
-def _paired(nearest: Nearest | None) -> Iterator[Warning]:
+def _paired(nearest: Nearest | None, neighbours: str) -> Iterator[Warning]:
     if nearest and nearest["median"] < PAIRED:
         yield Warning(
             "paired",
             "particles form close pairs (pairing instability): the median distance to the nearest "
             f"neighbour is {nearest['median']:.2g} of the particle spacing, so the resolution is "
             "lower than the number of particles suggests. Try a Wendland kernel, or a smaller "
-            "physics.eta.",
+            f"{neighbours}.",
         )
 
 
@@ -150,7 +151,7 @@ def _limits(problem, summary: Summary, precision: str) -> Iterator[Warning]:
 def _is_said(name: str, problem, summary: Summary) -> bool:
     """Return whether another kind of warning already reports that number."""
     if name == "energy_drift":
-        return any(_energy(summary["conservation"]))
+        return any(_energy(summary["conservation"], ""))
     return name in problem.swamped and not problem.swamped[name].holds(figure(summary, name))
 
 

@@ -154,7 +154,8 @@ class Watchdog:
         raise fault(
             simulation,
             f"the densities do not fit the box: the sum of m/rho is {ratio:.3g} of its volume",
-            "a larger physics.eta, so that kernels contain more neighbours, or more particles",
+            f"a larger {simulation.scene.formulation.neighbours_key}, so that kernels contain more "
+            "neighbours, or more particles",
             0,
         )
 

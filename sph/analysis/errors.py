@@ -4,9 +4,11 @@ import numpy as np
 
 from sph.analysis import truth
 from sph.config import Config
+from sph.problems.support import uniaxial
 from sph.summary import AbsoluteNorms, Errors, Norms
 
 FIELDS = ("density", "velocity", "pressure", "internal_energy")
+OF_SOLIDS = (*FIELDS, "stress")
 
 
 def norms(difference, volume) -> AbsoluteNorms:
@@ -35,7 +37,7 @@ def by_field(state: dict, exact: dict, volume, inside) -> dict[str, Norms]:
     """
     found: dict[str, Norms] = {}
     volume = volume[inside]
-    for name in FIELDS:
+    for name in OF_SOLIDS:
         if name in exact:
             nothing = np.broadcast_to(0.0, exact[name].shape)
             own = _norms_of(_distances(state[name], exact[name], inside), volume)
@@ -65,6 +67,8 @@ def against_exact(config: Config, time: float, particles, pressure) -> Errors | 
         "pressure": pressure,
         "internal_energy": particles.internal_energy,
     }
+    if "stress" in exact:
+        state["stress"] = uniaxial.compressive_stress(particles, pressure)
     fields = by_field(state, exact, particles.mass / particles.density, inside)
     return {
         "against": problem.truth[0],

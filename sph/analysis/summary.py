@@ -82,11 +82,16 @@ def conservation(history, particles, scene, start: Baseline) -> Conservation:
     return {
         "energy_drift": float(drift[-1]),
         "energy_drift_max": float(np.abs(drift).max()),
-        "energy_injected": float(history["energy_injected"][-1] / start.scale),
+        "energy_injected": _relative(history["energy_injected"][-1], start.scale),
         "momentum_change": _momentum_change(history, particles, scene),
         "volume_ratio": None if ratio is None else float(ratio[-1]),
         "volume_ratio_worst": None if ratio is None else float(_farthest_from_one(ratio)),
     }
+
+
+def _relative(energy: float, scale: float) -> float:
+    """Return energy/scale, 0 for no energy: matter may begin at rest, without energy."""
+    return float(energy / scale) if energy != 0.0 else 0.0
 
 
 def baseline(history) -> Baseline:
@@ -105,7 +110,7 @@ def _momentum_change(history, particles, scene) -> float | None:
     p = particles
     with np.errstate(invalid="ignore"):  # the last state of a run that failed
         bulk = scene.keeps_momentum * (p.velocity @ p.mass) / p.mass.sum()
-        sound_speed = scene.eos.sound_speed(p.density, scene.formulation.pressure(p))
+        sound_speed = scene.formulation.sound_speed(p)
         speed = np.linalg.norm(p.velocity - bulk[:, None], axis=0)
         scale = float(np.sum(p.mass * (speed + sound_speed)))
     return float(np.abs(momentum - momentum[:, :1]).max() / scale)
@@ -207,7 +212,7 @@ def _kept_in_words(kept: Conservation) -> str:
     if injected:
         parts[0] += f" ({injected:.2g} of it to keep internal energies positive)"
     parts.append(
-        "momentum is not conserved at walls or in an external field"
+        "momentum is not conserved at walls, by clamps or in an external field"
         if change is None
         else f"momentum to {change:.2g}"
     )

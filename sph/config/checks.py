@@ -68,13 +68,25 @@ def under_physics(found: dict[str, Section]) -> list[Issue]:
     return []
 
 
+def steps_issues(found: dict[str, Section]) -> list[Issue]:
+    """Return an issue if the formulation has no individual time steps, which the user wants."""
+    if not {"time", "physics"} <= found.keys() or found["time"].stepping == "global":
+        return []
+    if found["physics"].kinds[0].individual_steps:
+        return []
+    name = value_text(found["physics"].formulation)
+    text = f'= "individual": expected "global" for physics.formulation = {name}'
+    return [Issue(("time", "stepping"), text)]
+
+
 def pairing_issues(found: dict[str, Section]) -> list[Issue]:
     """Return an issue if particles pair with this kernel at this eta, unless pairing is allowed."""
-    if not {"problem", "physics"} <= found.keys() or found["physics"].allow_pairing:
+    if not {"problem", "physics"} <= found.keys():
         return []
     physics, dimension = found["physics"], found["problem"].dimension
-    if "eta" not in type(physics).model_fields:
-        return []  # the limits of kernels were measured for gas; the summary reports pairs
+    # the limits of kernels were measured for gas; for other matter the summary reports pairs
+    if "eta" not in type(physics).model_fields or physics.allow_pairing:
+        return []
     limit = physics.kernel_model().pairs_above.get(dimension, math.inf)
     if physics.eta <= limit:
         return []

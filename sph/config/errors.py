@@ -147,7 +147,7 @@ def describe(annotation: Any, plural: bool = False) -> str:
         entries = describe(typing.get_args(bare)[0], plural=True)
         return f"{'lists' if plural else 'a list'} of {_length(said)}{entries}"
     if _is_table(bare):
-        return "a table { " + ", ".join(bare.model_fields) + " }"
+        return ("tables" if plural else "a table") + f" {{ {', '.join(bare.model_fields)} }}"
     if typing.get_origin(bare) is dict:
         return "a table"
     if bare is bool:

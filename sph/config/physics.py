@@ -67,13 +67,8 @@ class Physics(Section):
         None,
         description="the materials of a scene with several bodies by name, in place of gamma, eos "
         'and strength; formulation "continuum" only',
+        examples=[{"water": {"eos": {"name": "tait", "rho_0": 1000.0, "c_0": 30.0}}}],
         json_schema_extra=REFUSED,
-    )
-    allow_pairing: bool = Field(
-        False,
-        description="allow a spline kernel at values of eta for which its particles form close "
-        "pairs (the pairing instability)",
-        json_schema_extra=RECORDED,
     )
     max_support: float = Field(
         1.0,

@@ -170,6 +170,7 @@ def resolve(
     issues += checks.gas_issues(found)
     issues += checks.part_issues(found)
     issues += checks.under_physics(found)
+    issues += checks.steps_issues(found)
     if not recorded:
         issues += checks.pairing_issues(found)
     issues += checks.output_issues(found)

@@ -24,6 +24,7 @@ class Formulation(Part):
     # defaults of keys of [physics] that every formulation has, if not those of most formulations
     defaults: ClassVar[Mapping[str, Any]] = MappingProxyType({})
     neighbours_key: ClassVar[str] = ""  # the key that sets the number of neighbours
+    individual_steps: ClassVar[bool] = False  # whether particles may have time steps of their own
     # The models that passes use, among them `kernel`, `eos`, `support_ratio` (H/h) and `eta`.
     models: Any
 
@@ -41,6 +42,13 @@ class Formulation(Part):
     def sound_speed(self, state: State) -> np.ndarray:
         """Return the speed of sound (N,) of the state at the end of a step."""
         return self.eos.sound_speed(state.density, self.pressure(state))
+
+    def derived(self, state: State) -> list[tuple[Public, np.ndarray]]:
+        """Return public quantities that checkpoints hold besides the stored fields.
+
+        Arrays: (N,), or (D, N) and (3, 3, N) for vectors and tensors. The pressure is the first.
+        """
+        return [(PRESSURE, self.pressure(state))]
 
 
 BASE = Formulation

@@ -13,7 +13,6 @@ import h5py
 import numpy as np
 
 from sph import kernels
-from sph.formulations import PRESSURE
 from sph.output import hdf5
 from sph.state import Public
 
@@ -119,7 +118,8 @@ def _fields(checkpoint, frame: Frame) -> Iterator[tuple[Public, np.ndarray, Rows
             usual = _in_three_dimensions if field.rank else _unchanged
             rows: Any = special.get(field.name, usual)
             yield field.public, getattr(particles, field.name), rows
-    yield PRESSURE, checkpoint.pressure, _unchanged
+    for public, array in checkpoint.scene.formulation.derived(particles):
+        yield public, array, _in_three_dimensions if array.ndim > 1 else _unchanged
 
 
 def _unchanged(array: np.ndarray) -> np.ndarray:

@@ -78,6 +78,7 @@ class Problem(Section):
       truth      what `exact` returns, as a phrase and as a label in figures: an exact solution, or
                  a reference solution from another method
       profiled   whether figures show profiles over x or over the distance; otherwise, maps
+      profiles   the four fields of these profiles; solids have "stress", which is -sigma_xx
     """
 
     restart: ClassVar[str | None] = "refused"
@@ -88,6 +89,7 @@ class Problem(Section):
     swamped: ClassVar[dict[str, Limit]] = {}
     truth: ClassVar[tuple[str, str]] = ("the exact solution", "exact")
     profiled: ClassVar[bool] = True
+    profiles: ClassVar[tuple[str, ...]] = ("density", "velocity", "pressure", "internal_energy")
 
     name: str = Field(description="name of the problem; `sph list` shows all problems")
     dimension: int = Field(ge=1, le=3, description="number of space dimensions")
@@ -156,8 +158,8 @@ class Problem(Section):
     def exact(self, eos, time: float, position: np.ndarray) -> dict[str, np.ndarray] | None:
         """Return exact density (N,), velocity (D, N), pressure and internal_energy (N,), or None.
 
-        position: (D, N) points. Callers use `sph.analysis.truth`, which checks where the exact
-        solution is valid.
+        position: (D, N) points. Solids add "stress", -sigma_xx (N,). Callers use
+        `sph.analysis.truth`, which checks where the exact solution is valid.
         """
         return None
 

@@ -31,8 +31,8 @@ class Problem(base.Problem):
         "physics.eos": {"name": "tait", "rho_0": DENSITY, "c_0": SOUND},
         "physics.strength": {"name": "elastic", "shear_modulus": SHEAR},
         "physics.tensile_correction": 0.3,
-        "time.end": 3e-4,
-        "output.interval": 3e-5,
+        "time.end": 4e-4,
+        "output.interval": 4e-5,
     }
     limits: ClassVar = {
         "energy_drift": base.Limit(5e-3, "error of the leapfrog"),

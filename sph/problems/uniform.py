@@ -122,7 +122,7 @@ class Problem(base.Problem):
         density, energy = particles.density, particles.internal_energy
         return {
             "density_spread": float(density.max() / density.min() - 1.0),
-            "energy_spread": float(energy.max() / energy.min() - 1.0),
+            "energy_spread": float(np.ptp(energy) / (energy.min() or 1.0)),
         }
 
     def compare(self, eos, time: float, particles, pressure) -> dict[str, float]:

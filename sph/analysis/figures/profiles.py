@@ -1,4 +1,4 @@
-"""Profiles of density, velocity, pressure and internal energy, along x or the radius."""
+"""Profiles of density, velocity, pressure or stress, and energy, along x or the radius."""
 
 import textwrap
 from collections.abc import Sequence
@@ -8,7 +8,6 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from sph.analysis import truth
-from sph.analysis.errors import FIELDS
 from sph.analysis.figures import style
 from sph.analysis.figures.sources import State
 
@@ -43,7 +42,7 @@ def profile(state: State) -> Profile:
         along = (velocity * offset).sum(axis=0) / np.where(coordinate > 0.0, coordinate, 1.0)
     else:
         coordinate, along = position[0], velocity[0]
-    scalars = {name: state.scalar(name)[inside] for name in FIELDS if name != "velocity"}
+    scalars = {name: state.scalar(name)[inside] for name in problem.profiles if name != "velocity"}
     end = coordinate.max()
     # not at r = 0 itself, where an exact blast has no gas
     start = end / EXACT_POINTS if state.is_radial else coordinate.min()
@@ -111,7 +110,8 @@ def over_time(states: Sequence[State]) -> Figure:
 
 def _figure(states, labels, colours, title, note_errors: bool) -> Figure:
     figure = style.new_figure(7.2, 5.8)
-    panels = dict(zip(FIELDS, figure.subplots(2, 2, sharex=True).flat, strict=True))
+    names = states[0].problem.profiles
+    panels = dict(zip(names, figure.subplots(2, 2, sharex=True).flat, strict=True))
     profiles, alone = [profile(state) for state in states], len(states) == 1
     errors = [state.errors() if note_errors else {} for state in states]
     for name, panel in panels.items():

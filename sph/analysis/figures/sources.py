@@ -12,6 +12,7 @@ from sph.domain import Domain
 from sph.errors import FileError
 from sph.output import checkpoint, same_run
 from sph.output.run_directory import RunDirectory, find
+from sph.problems.support import uniaxial
 
 
 @dataclass(frozen=True)
@@ -161,13 +162,17 @@ class State:
         return self.checkpoint.config.physics.formulation == "continuum"
 
     def scalar(self, name: str) -> np.ndarray:
-        """(N,) density, pressure, internal_energy, plastic_strain, speed |v|, or von_mises."""
+        """Return a quantity (N,): density, pressure, internal_energy, plastic_strain, speed |v|,
+        von_mises, or stress, which is -sigma_xx of a solid.
+        """
         if name == "speed":
             return np.linalg.norm(self.particles.velocity, axis=0)
         if name == "von_mises":
             return von_mises(self.particles.deviatoric_stress)
         if name == "pressure":
             return self.checkpoint.pressure
+        if name == "stress":
+            return uniaxial.compressive_stress(self.particles, self.checkpoint.pressure)
         return getattr(self.particles, name)
 
     def exact(self, position: np.ndarray) -> dict[str, np.ndarray] | None:

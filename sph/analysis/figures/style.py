@@ -21,6 +21,7 @@ SYMBOLS = {
     "velocity": r"$v$",
     "pressure": r"$P$",
     "internal_energy": r"$u$",
+    "stress": r"$-\sigma_{xx}$",
     "speed": r"$|\mathbf{v}|$",
     "plastic_strain": r"$\varepsilon_p$",
     "von_mises": r"$\sigma_{\mathrm{vM}}$",

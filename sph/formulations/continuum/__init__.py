@@ -27,6 +27,7 @@ DEVIATOR = Field(
     rank=2,
     public=Public("DeviatoricStressTensors", -1, 1, -2, -5, "Deviator of the stress tensor"),
 )
+STRESS = Public("StressTensors", -1, 1, -2, -5, "Stress tensor, positive in tension")
 PLASTIC_STRAIN = Field(
     "plastic_strain",
     at_least=0.0,
@@ -154,11 +155,23 @@ class Continuum(Formulation):
         self.evolved = self._evolved()
         self.passes = self._passes()
         self.columns = ("corrections_failed",) if self.order == 1 else ()
-        self.idle = () if self.order == 1 else ("sums",)
+        # `check` only names the particle: a NaN is in the sums of the step, always checked
+        self.idle = ("check",) if self.order == 1 else ("check", "sums")
 
     @classmethod
     def of(cls, scene):
         return cls(scene)
+
+    @classmethod
+    def issues(cls, physics, problem):
+        found = []
+        if physics.materials is not None and not physics.materials:
+            found.append(("materials", "expected at least one material"))
+        for key in ("eos", "strength"):
+            if physics.materials and getattr(physics, key) is not None:
+                text = "expected it in the tables of physics.materials, which are given"
+                found.append((key, text))
+        return found
 
     def _fields(self) -> tuple[Field, ...]:
         # elastic energy released in tension may exceed the heat
@@ -292,12 +305,16 @@ class Continuum(Formulation):
         return self._by_material(state, of)
 
     def stress(self, state) -> np.ndarray:
-        """Return the stress tensor (D, D, N) of the state at the end of a step."""
-        deviator = state.get("deviatoric_stress")
-        shape = (self.dimension, self.dimension, state.number)
-        found = np.zeros(shape) if deviator is None else deviator.copy()
-        for d in range(self.dimension):
-            found[d, d] -= self.pressure(state)
+        """Return the stress tensor (3, 3, N) of the state at the end of a step.
+
+        Directions that the scene lacks are those of plane strain (2-D) and uniaxial strain (1-D).
+        """
+        D, found = self.dimension, np.zeros((3, 3, state.number))
+        if self.is_solid:
+            found[:D, :D] = state.deviatoric_stress
+            for d in range(D, 3):  # S stays traceless
+                found[d, d] = -np.trace(state.deviatoric_stress) / (3 - D)
+        found[np.arange(3), np.arange(3)] -= self.pressure(state)
         return found
 
     def _by_material(self, state, formula: Any) -> np.ndarray:
@@ -316,6 +333,12 @@ class Continuum(Formulation):
             return {}
         # the kernel has a gradient of its own only there
         return {"corrections_failed": float(state.kernel_gradient.any(axis=0).sum())}
+
+    def derived(self, state):
+        found = super().derived(state)
+        if self.is_solid:
+            found.append((STRESS, self.stress(state)))
+        return found
 
     # --- words ---
 

@@ -54,6 +54,13 @@ class Gas(Formulation):
             above=0.0,
         ),
         Key(
+            "allow_pairing",
+            "allow a spline kernel at values of eta for which its particles form close pairs (the "
+            "pairing instability)",
+            kind=bool,
+            default=False,
+        ),
+        Key(
             "scheme",
             "pair force: how a pair of neighbours accelerate each other and exchange energy; "
             "`sph list` describes each",
@@ -79,6 +86,7 @@ class Gas(Formulation):
         ),
     )
     neighbours_key = "physics.eta"
+    individual_steps = True
     roles = ("viscosity", "balsara", "exchange")
     reserves = ("pressure", "energy_shift", "div_v", "curl_v")
     evolved = (Evolved("internal_energy", "energy_rate", "predicted_energy", POSITIVE),)
@@ -120,6 +128,8 @@ class Gas(Formulation):
 
     @classmethod
     def issues(cls, physics, problem):
+        if physics.materials:
+            return [("materials", 'expected physics.formulation = "continuum"')]
         scheme = registry.model(SCHEMES, physics.scheme)
         eos = physics.eos_model()
         if eos.under_tension:

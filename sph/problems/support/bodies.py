@@ -207,7 +207,7 @@ def overlap(first: Placed, second: Placed) -> bool:
     """Return whether two bodies overlap.
 
     They do if a particle of one is inside the other, or if two of their particles are closer than
-    half of their mean spacing.
+    half of their mean spacing (eq 459).
     """
     from scipy.spatial import cKDTree  # costs 0.1 s to import, which only neighbouring bodies need
 

@@ -57,12 +57,15 @@ ENDS = {
     "shu_osher": ("shu_osher", (), 9.5 / (math.sqrt(1.4) * (3.0 + 1.25**0.5)), "from the end"),
     "sound_wave": ("sound_wave", ("problem.amplitude=0.1",), 1 / (0.1 * math.pi * 8 / 3), "breaks"),
     "evrard": ("evrard", (), 10.0, "computation of the reference"),
+    # Us = 3600 + 1.8 * 500
+    "flyer_plate": ("flyer_plate", (), 0.05 / 4500.0, "rear sides"),
+    "elastic_plastic_shock": ("elastic_plastic_shock", (), 0.05 / 5176.5, "rear sides"),
     "keplerian_ring": ("keplerian_ring", (), 0.15 / math.sqrt(5e-6 / 3), "ring's edges"),
 }  # fmt: skip
 FOR_EVER = {
-    "blast_waves", "blob", "contrast", "expanding_ball", "gresho", "kelvin_helmholtz",
-    "kelvin_helmholtz_smooth", "particles", "polytrope", "rayleigh_taylor", "square", "uniform",
-    "yee",
+    "blast_waves", "blob", "bodies", "contrast", "elastic_bar", "expanding_ball", "gresho",
+    "kelvin_helmholtz", "kelvin_helmholtz_smooth", "particles", "polytrope", "rayleigh_taylor",
+    "rubber_rings", "square", "taylor_bar", "uniform", "yee",
 }  # fmt: skip
 
 
@@ -75,7 +78,10 @@ def at_start(what) -> SimpleNamespace:
     start = what.problem.initial(what.physics.eos_model())
     n = start.mass.size
     return SimpleNamespace(
-        **start._asdict(), density=np.ones(n), support=np.full(n, 0.1), id=np.arange(1, n + 1)
+        **start._replace(others={})._asdict(),
+        density=np.ones(n),
+        support=np.full(n, 0.1),
+        id=np.arange(1, n + 1),
     )
 
 

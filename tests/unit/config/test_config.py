@@ -245,6 +245,8 @@ def test_template_reads_back_as_default_and_explains_every_key(problem):
             ]
             assert found  # two tables may have a key of one name
             assert all(lines[at - 1].startswith("# ") for at in found)
+    if plain.physics.formulation != "gas":
+        return
     # a long default stands in a line of its own
     assert "of at least 0 or a table { min, max, switch, ell } default" in words.replace(";", "")
 

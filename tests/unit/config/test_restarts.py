@@ -57,7 +57,6 @@ CONTINUUM_RECORDED = ["physics.spacing_ratio=1.5", "physics.q_a=1.0", "physics.q
 CONTINUUM_REFUSED = [
     "physics.correction=1",
     'physics.strength={ name = "elastic", shear_modulus = 2.0 }',
-    f"physics.materials.water.{WATER.removeprefix('physics.')}",
 ]
 
 
@@ -80,6 +79,7 @@ def test_every_key_is_covered_by_these_tests():
     assert keys - {"physics.formulation", "physics.materials"} <= tried
     tried |= {one.partition("=")[0] for one in CONTINUUM_FREE + CONTINUUM_RECORDED}
     tried |= {"physics.correction", "physics.strength", "physics.materials"}  # CONTINUUM_REFUSED
+    assert restarts.class_of(PHYSICS["continuum"], "materials") == "refused"  # replaces the laws
     assert {f"physics.{key}" for key in PHYSICS["continuum"].model_fields} - {
         "physics.formulation"
     } <= tried

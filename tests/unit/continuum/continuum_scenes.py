@@ -176,7 +176,6 @@ def scene_of(case, given, end):
         formulation="continuum", **laws, kernel=case.kernel, correction=case.order,
         spacing_ratio=case.spacing_ratio,
         q_a=1.7, q_b=0.8, balsara=case.balsara, tensile_correction=case.tensile,
-        allow_pairing=True,
     )  # fmt: skip
     return Scene(
         config.Config(
