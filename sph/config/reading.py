@@ -25,6 +25,8 @@ from sph.problems.base import Problem, Section
 
 # Keys that exclude each other: if the user gives one, the default of the other is not used.
 _IN_PLACE_OF = {"physics.eos": "gamma", "physics.gamma": "eos"}
+# Keys of one material, for which [physics.materials] has tables of its own.
+_OF_MATERIALS = ("physics.eos", "physics.gamma", "physics.strength")
 
 
 class Source(NamedTuple):
@@ -264,7 +266,8 @@ def _fill_defaults(
         table, name = key.split(".", 1)
         if name not in models[table].model_fields:
             continue
-        if _IN_PLACE_OF.get(key) not in raw[table]:
+        has_materials = key in _OF_MATERIALS and "materials" in raw[table]
+        if _IN_PLACE_OF.get(key) not in raw[table] and not has_materials:
             raw[table].setdefault(name, value)
 
 

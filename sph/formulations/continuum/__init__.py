@@ -327,6 +327,9 @@ class Continuum(Formulation):
             found[there] = formula(one, state.density[there], state.internal_energy[there])
         return found
 
+    def pieces(self, state):
+        return pieces.of(state, self.domain) if self.is_solid else None
+
     def sums(self, state):
         """Return corrections_failed: the number of particles at which order 1 fell back to 0."""
         if self.order != 1:
@@ -391,9 +394,6 @@ class Continuum(Formulation):
                 "equation of state that holds at this density",
                 int(p.id[i]),
             )
-
-    def pieces(self, state):
-        return pieces.of(state, self.domain) if self.is_solid else None
 
     def check_output(self, simulation):
         """Raise NumericalError if a solid body has torn."""
