@@ -59,7 +59,7 @@ def test_material_behind_plastic_front_is_at_yield_surface(run):
     # the radial return ends each step, so only round-off is left
     assert deviator.max() <= 4e8 * (1.0 + 1e-12)
     distance = np.abs(particles.position[0])
-    behind = (0.005 < distance) & (distance < 0.02)  # at the plane of impact the stress overshot
+    behind = (distance > 0.005) & (distance < 0.02)  # at the plane of impact the stress overshot
     # oscillations behind the front unload by up to 0.7 % (measured), elastically
     assert deviator[behind].min() > 0.985 * 4e8
     assert particles.plastic_strain[behind].min() > 0.0
