@@ -72,7 +72,9 @@ def _problem_table(page: str) -> str:
     next_table = next(
         i for i, line in enumerate(lines) if line.startswith("[") and "[problem]" not in line
     )
-    return "".join(lines[: next_table - 1]).rstrip() + "\n"
+    while lines[next_table - 1].startswith("#"):
+        next_table -= 1
+    return "".join(lines[:next_table]).rstrip() + "\n"
 
 
 if __name__ == "__main__":

@@ -11,7 +11,7 @@ from numba import njit
 
 from sph.compiled import COMPILED
 from sph.domain import Domain
-from sph.kernels import w
+from sph.kernels import normalisation, w
 
 # Particles that `at_points` handles at once: some million pairs in 3-D.
 CHUNK = 10_000
@@ -70,8 +70,13 @@ def at_points(
     return means[: len(scalars)], means[len(scalars) :]
 
 
-def onto_plane(values: np.ndarray, particles, domain: Domain, kernel, plane: Plane) -> np.ndarray:
-    """Scalar fields `values` (F, N) of the particles at the centres of the pixels, (F, ny, nx)."""
+def onto_plane(
+    values: np.ndarray, particles, domain: Domain, kernel, plane: Plane, least: float = 0.0
+) -> np.ndarray:
+    """Scalar fields `values` (F, N) of the particles at the centres of the pixels, (F, ny, nx).
+
+    NaN where the sum of V W is at most `least`; it is 1 inside matter and 1/2 at a plane surface.
+    """
     values = np.ascontiguousarray(values, dtype=np.float64)
     H, weight = particles.support, _weight(particles)
     step = (plane.high - plane.low) / np.array(plane.shape)
@@ -87,7 +92,7 @@ def onto_plane(values: np.ndarray, particles, domain: Domain, kernel, plane: Pla
                 kernel, (0,) * particles.dimension, image[:2, near], depth[near], H[near],
                 weight[near], values[:, near], first, step, total, sums,
             )  # fmt: skip
-    return _means(sums, total)
+    return _means(sums, total, least / normalisation(kernel, (0,) * particles.dimension))
 
 
 def _weight(particles) -> np.ndarray:
@@ -95,10 +100,10 @@ def _weight(particles) -> np.ndarray:
     return particles.mass / (particles.density * particles.support**particles.dimension)
 
 
-def _means(sums: np.ndarray, total: np.ndarray) -> np.ndarray:
-    """sums (F, …) over the sum of weights (…), NaN where no kernel reaches."""
+def _means(sums: np.ndarray, total: np.ndarray, least: float = 0.0) -> np.ndarray:
+    """sums (F, …) over the sum of weights (…), NaN where that is at most `least`."""
     with np.errstate(invalid="ignore"):
-        return np.where(total > 0.0, sums / total, np.nan)
+        return np.where(total > least, sums / total, np.nan)
 
 
 def _reaches(position, depth, H, plane: Plane) -> np.ndarray:

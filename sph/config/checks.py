@@ -3,6 +3,8 @@
 import math
 from typing import Any
 
+from pydantic_core import PydanticCustomError
+
 from sph import declarations
 from sph.config.errors import Issue
 from sph.config.toml_text import value_text
@@ -57,6 +59,9 @@ def under_physics(found: dict[str, Section]) -> list[Issue]:
         return []
     try:
         found["problem"] = found["problem"].under(found["physics"])
+    except PydanticCustomError as error:
+        faults = (error.context or {})["issues"]
+        return [Issue(("problem", *fault.path), fault.text) for fault in faults]
     except ValueError as error:
         key, _, text = str(error).partition(" ")
         return [Issue(("physics", key.removeprefix("physics.")), text)]

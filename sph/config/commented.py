@@ -1,6 +1,7 @@
 """The commented configuration that `sph new` prints."""
 
 import textwrap
+import typing
 from collections.abc import Mapping
 from typing import Any
 
@@ -43,7 +44,7 @@ def _restart(model: type[Section], key: str) -> str:
 
 def _key(key: str, field: FieldInfo, sentence: str, value: Any, restart: str) -> str:
     annotation = field_annotation(field)
-    shown = value.model_dump(exclude_none=True) if isinstance(value, BaseModel) else value
+    shown = _plain(value)
     default = "" if shown is None else f"default {value_text(shown)}"
     kind = describe(annotation)
     fits = default and len(kind) + len(default) < 90
@@ -54,16 +55,26 @@ def _key(key: str, field: FieldInfo, sentence: str, value: Any, restart: str) ->
     return above + entries + _line(key, field, shown)
 
 
+def _plain(value: Any) -> Any:
+    """Return a value of numbers, texts, lists and tables."""
+    if isinstance(value, BaseModel):
+        return value.model_dump(exclude_none=True)
+    return [_plain(one) for one in value] if isinstance(value, list) else value
+
+
 def _entries(branch: Any) -> str:
     """Return a comment line for each key of an inline table, "" if the value is not a table.
 
     For a table that names a model: the parameters of each model that has some.
     """
     tables: dict[str, type[BaseModel]]
+    bare = typing.get_args(branch)[0] if typing.get_origin(branch) is typing.Annotated else branch
     if isinstance(choice := choice_of(branch), ModelChoice):
         tables = {f"{name}: ": choice.parameters(name) for name in choice.valid_names()}
     elif isinstance(branch, type) and issubclass(branch, BaseModel):
         tables = {"": branch}
+    elif typing.get_origin(bare) is list:
+        return "".join(_entries(entry) for entry in typing.get_args(bare))
     else:
         return ""
     return "".join(

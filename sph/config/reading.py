@@ -25,6 +25,8 @@ from sph.problems.base import Problem, Section
 
 # Keys that exclude each other: if the user gives one, the default of the other is not used.
 _IN_PLACE_OF = {"physics.eos": "gamma", "physics.gamma": "eos"}
+# Keys of one material, for which [physics.materials] has tables of its own.
+_OF_MATERIALS = ("physics.eos", "physics.gamma", "physics.strength")
 
 
 class Source(NamedTuple):
@@ -162,7 +164,10 @@ def resolve(
             found[name] = model.model_validate(_without(raw[name], spoilt))
         except ValidationError as error:
             details = _details(error, problem is not None, bool(spoilt))
-            elsewhere = _tables_of_keys(models, besides=name)
+            tables = _tables_of_keys(models, besides=name)
+            elsewhere = {key: f"in [{one}]" for key, one in tables.items()}
+            if name == "physics":
+                elsewhere |= physics.keys_of_other_formulations(raw["physics"])
             issues += explain(model, raw[name], details, name, elsewhere)
         except ArithmeticError as error:  # in a validator, such as the count of lattice cells
             text = f": {error}; expected numbers closer to 1, and domain sides of similar length"
@@ -261,7 +266,8 @@ def _fill_defaults(
         table, name = key.split(".", 1)
         if name not in models[table].model_fields:
             continue
-        if _IN_PLACE_OF.get(key) not in raw[table]:
+        has_materials = key in _OF_MATERIALS and "materials" in raw[table]
+        if _IN_PLACE_OF.get(key) not in raw[table] and not has_materials:
             raw[table].setdefault(name, value)
 
 

@@ -2,6 +2,7 @@
 
 import re
 import tomllib
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import tomli_w
@@ -44,6 +45,7 @@ class _Reader:
         self.tokens = _tokens(text)
         self.at = 0
         self.lines: dict[Path, int] = {}
+        self.tables: dict[Path, int] = {}  # index of the last table [[...]] of each array
 
     @property
     def next(self) -> str:
@@ -79,47 +81,62 @@ class _Reader:
                 self.pair(table)
 
     def header(self) -> Path:
+        brackets = 0
         while self.next == "[":
+            brackets += 1
             self.take()
-        path, line = self.key()
+        parts, line = self.key()
         while self.next == "]":
             self.take()
+        path: Path = ()
+        for i, part in enumerate(parts, start=1):
+            path += (part,)
+            if brackets == 2 and i == len(parts):
+                self.tables[path] = self.tables.get(path, -1) + 1
+            if path in self.tables:
+                path += (self.tables[path],)
         self.note(path, 0, line)
         return path
 
-    def pair(self, table: Path | None) -> None:
+    def pair(self, table: Path) -> None:
         key, line = self.key()
         self.take()  # =
-        if table is None:
-            self.value(None)
-            return
         self.note(table + key, len(table), line)
         self.value(table + key)
 
-    def value(self, path: Path | None) -> None:
-        """Skip a value; note the keys of an inline table unless `path` is None (in an array)."""
+    def value(self, path: Path) -> None:
+        """Skip a value; note the keys of inline tables, also of those in arrays."""
         if self.next == "{":
-            self.entries("}", lambda: self.pair(path))
+            self.entries("}", lambda _: self.pair(path))
         elif self.next == "[":
-            self.entries("]", lambda: self.value(None))
+            self.entries("]", lambda index: self.entry((*path, index)))
         else:
             while self.next not in ("\n", ",", "]", "}"):
                 self.take()
 
-    def entries(self, close: str, read) -> None:
+    def entry(self, path: Path) -> None:
+        """Skip an entry of an array; note where it begins if it is an inline table."""
+        if self.next == "{":
+            self.note(path, len(path) - 1, self.tokens[self.at].line)
+        self.value(path)
+
+    def entries(self, close: str, read: Callable[[int], None]) -> None:
         self.take()
+        index = 0
         while self.next != close:
             if self.next in ("\n", ","):
                 self.take()
             else:
-                read()
+                read(index)
+                index += 1
         self.take()
 
 
 def key_lines(text: str) -> dict[Path, int]:
     """Return the line (from 1) at which each table and key of a valid TOML text begins, by path.
 
-    Entries of an array are not listed; the array's key is.
+    Tables in an array are listed with their index, e.g. ("problem", "body", 0); other entries of an
+    array are not, but the array's key is.
     """
     reader = _Reader(text)
     reader.statements()

@@ -1,12 +1,13 @@
 """Base class of all problems: the shared keys, and the methods that the program calls."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from types import MappingProxyType
 from typing import Any, ClassVar, Literal, NamedTuple
 
 import numpy as np
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field
+from pydantic_core import PydanticCustomError
 
 Boundary = Literal["periodic", "mirror", "open"]
 
@@ -36,6 +37,20 @@ class Limit(NamedTuple):
     def holds(self, value: float) -> bool:
         """Return whether `value` is within the limit; False for NaN."""
         return value >= self.bound if self.at_least else value <= self.bound
+
+
+class Fault(NamedTuple):
+    """An error in a key of [problem]: its path there, e.g. ("body", 2, "material"), and the text
+    that follows the key's name in the message.
+    """
+
+    path: tuple[str | int, ...]
+    text: str
+
+
+def refused(faults: Iterable[Fault]) -> PydanticCustomError:
+    """Return an error to raise in a validator, or in `Problem.under`, that names several keys."""
+    return PydanticCustomError("issues", "{issues}", {"issues": list(faults)})
 
 
 class Section(BaseModel):
@@ -113,7 +128,8 @@ class Problem(Section):
         """Return the problem with what it takes from [physics], such as the constant G of gravity.
 
         The configuration calls this once. Raises ValueError, with a message that begins with a key
-        of [physics], if the problem cannot be set up under these physics.
+        of [physics], if the problem cannot be set up under these physics, or `refused` if keys of
+        [problem] do not match them.
         """
         return self
 

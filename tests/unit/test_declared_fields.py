@@ -18,6 +18,9 @@ RANGE = "physics.alpha={ min = 0.1, max = 1.5 }"
 CONTACTS = 'physics.conductivity={ name = "pressure_jump", switched = true }'
 FIELD = 'physics.external={ name = "point_mass", mass = 0.1, softening = 0.2 }'
 HEATING = 'physics.heating={ name = "relaxation", energy = 2.0, time = 0.1 }'
+PLASTIC = 'physics.strength={ name = "elastic_plastic", shear_modulus = 0.5, yield_stress = 0.05 }'
+FORMULATION = "physics.formulation=continuum"
+SOLID = (FORMULATION, PLASTIC, "physics.tensile_correction=0.3")
 TWO = ("problem.dimension=2", "problem.domain=[[-0.5, 0.5], [0.0, 0.1]]", "problem.n=300")
 
 SCENES = [
@@ -29,11 +32,16 @@ SCENES = [
     (FIELD, HEATING, RANGE),
     (*TWO, SHOCKS, "physics.density=number"),
     (*TWO, RANGE, CONTACTS, "physics.density_passes=converged"),
+    (FORMULATION, "physics.correction=-1"),
+    (*TWO, *SOLID),
+    (*TWO, *SOLID, "physics.correction=1"),
 ]
 
 
 def scene_of(settings):
     text = '[problem]\nname = "shock_tube"\nn = 80\n[time]\nend = 0.2\n'
+    if FORMULATION in settings:  # the keys of another one would remain
+        text += '[physics]\nformulation = "continuum"\n'
     return Scene(config.from_text(text, "the test").override(settings))
 
 

@@ -14,13 +14,15 @@ from sph.analysis.interpolate import Plane, onto_plane
 PIXELS = 512  # on the longer side
 PIXELS_OF_MANY = 320
 LONGEST_SIDE = 3.6  # inches, of a map that stands with one other
+AT_SURFACE = 0.5  # sum of V W at a plane surface of matter that ends at its particles
+MOST_OUTLINES = 12  # bodies of which outlines are drawn
 LONGEST_TITLE = 40  # letters in a line above a map that stands with others
 WIDEST = 9.0  # inches, of a picture of many maps
 
 
 def single(state: State) -> Figure:
-    """Density and a second field at one time."""
-    names = ("density", second_field(state))
+    """Density and a second field at one time; for solids, plastic strain and stress."""
+    names = (main_field(state), second_field(state))
     plane = plane_of(state, PIXELS)
     images = _images(state, names, plane)
     columns, width, height = _arrangement(plane, 2, 2 * LONGEST_SIDE)
@@ -29,29 +31,45 @@ def single(state: State) -> Figure:
     for panel, name, values in zip(panels.flat, names, images, strict=True):
         image = _show(panel, values, plane, name, style.scale(values))
         figure.colorbar(image, ax=panel, pad=0.02, extend=_extends(image))
-        panel.set_title(f"{name} {style.SYMBOLS[name]}")
+        _outline(panel, state, plane)
+        panel.set_title(f"{style.TITLES.get(name, name)} {style.SYMBOLS[name]}")
     _label_axes(panels, 2)
     figure.suptitle(f"{state.title}, {state.when}{_where(plane)}")
     return figure
 
 
 def over_time(states: Iterable[State]) -> Figure:
-    """Density of one run at several times, in one scale of colours."""
-    drawn = [_density(state, state.when, state.title) for state in states]
+    """The main field of one run at several times, in one scale of colours."""
+    drawn = [_drawn(state, state.when, state.title) for state in states]
     return _side_by_side(drawn)
 
 
 def compared(states: Iterable[State], labels: Sequence[str]) -> Figure:
-    """Density of several runs, in one scale of colours."""
+    """The main field of several runs, in one scale of colours."""
     pairs = zip(states, labels, strict=True)
     drawn = [
-        _density(state, f"{style.plain(label)}, {state.when}", state.name) for state, label in pairs
+        _drawn(state, f"{style.plain(label)}, {state.when}", state.name) for state, label in pairs
     ]
     return _side_by_side(drawn)
 
 
+def main_field(state: State) -> str:
+    """Density; plastic strain or, without yielding, von Mises stress of a solid.
+
+    The density of a solid changes little.
+    """
+    if not state.is_solid:
+        return "density"
+    return "von_mises" if state.particles.get("plastic_strain") is None else "plastic_strain"
+
+
 def second_field(state: State) -> str:
-    """Pressure where it varies by more than a factor 2; nearer to balance, speed tells more."""
+    """Pressure where it varies by more than a factor 2; nearer to balance, speed tells more.
+
+    Of a solid that yields von Mises stress, otherwise pressure.
+    """
+    if state.is_solid:
+        return "pressure" if main_field(state) == "von_mises" else "von_mises"
     low, high = np.percentile(state.scalar("pressure"), [1, 99])
     return "pressure" if high > 2.0 * low else "speed"
 
@@ -67,43 +85,63 @@ def plane_of(state: State, pixels: int) -> Plane:
     return plane if plane.height is None else plane._replace(height=float(state.problem.centre[2]))
 
 
-class _Density(NamedTuple):
-    """A map of density, which takes less memory than the state it is of."""
+class _Map(NamedTuple):
+    """A map of one field, which takes less memory than the state it is of."""
 
     values: np.ndarray  # (ny, nx)
+    field: str
     plane: Plane
     label: str
     what: str  # for the title
 
 
-def _density(state: State, label: str, what: str) -> _Density:
-    plane = plane_of(state, PIXELS_OF_MANY)
-    (values,) = _images(state, ["density"], plane)
-    return _Density(values, plane, label, what + _where(plane))
+def _drawn(state: State, label: str, what: str) -> _Map:
+    plane, field = plane_of(state, PIXELS_OF_MANY), main_field(state)
+    (values,) = _images(state, [field], plane)
+    return _Map(values, field, plane, label, what + _where(plane))
 
 
-def _side_by_side(drawn: Sequence[_Density]) -> Figure:
+def _side_by_side(drawn: Sequence[_Map]) -> Figure:
     scale = style.scale(np.concatenate([one.values.ravel() for one in drawn]))
     columns, width, height = _arrangement(drawn[0].plane, len(drawn), WIDEST)
     rows = -(-len(drawn) // columns)
     figure = style.new_figure(columns * width + 1.2, rows * (height + 0.35) + 0.8, "compressed")
     panels = figure.subplots(rows, columns, squeeze=False)
     for panel, one in zip(panels.flat, drawn, strict=False):
-        image = _show(panel, one.values, one.plane, "density", scale)
+        image = _show(panel, one.values, one.plane, one.field, scale)
         panel.set_title(textwrap.fill(one.label, LONGEST_TITLE))
     shown, empty = np.split(panels.ravel(), [len(drawn)])
     for panel in empty:
         panel.remove()
     _label_axes(panels, len(drawn))
     bar = figure.colorbar(image, ax=list(shown), pad=0.015, aspect=30, extend=_extends(image))
-    bar.ax.set_title(style.SYMBOLS["density"])
+    fields = sorted({one.field for one in drawn})
+    bar.ax.set_title(", ".join(style.SYMBOLS[name] for name in fields))
     figure.suptitle("; ".join(sorted({one.what for one in drawn})))
     return figure
 
 
 def _images(state: State, names: Sequence[str], plane: Plane) -> np.ndarray:
     values = np.stack([state.scalar(name) for name in names])
-    return onto_plane(values, state.particles, state.domain, state.kernel, plane)
+    return _interpolated(state, values, plane)
+
+
+def _interpolated(state: State, values: np.ndarray, plane: Plane) -> np.ndarray:
+    least = AT_SURFACE if state.has_surface else 0.0
+    return onto_plane(values, state.particles, state.domain, state.kernel, plane, least)
+
+
+def _outline(panel, state: State, plane: Plane) -> None:
+    """Draw the outlines of several solid bodies, which may touch each other."""
+    body = state.particles.get("body")
+    numbers = np.unique(body) if body is not None else np.zeros(0)
+    if not 2 <= numbers.size <= MOST_OUTLINES:
+        return
+    shares = _interpolated(state, np.stack([body == one for one in numbers]), plane)
+    step = (plane.high - plane.low) / np.array(plane.shape)
+    x, y = (plane.low[d] + step[d] * (np.arange(plane.shape[d]) + 0.5) for d in range(2))
+    for share in np.nan_to_num(shares):
+        panel.contour(x, y, share, levels=[0.5], colors="white", linewidths=0.7)
 
 
 def _show(panel, values, plane: Plane, name: str, scale):

@@ -92,6 +92,18 @@ def _without_table(setting: str) -> str:
     return f"{key.rpartition('.')[2]}={value}"
 
 
+def von_mises(S: np.ndarray) -> np.ndarray:
+    """(N,) the equivalent stress (3/2 S : S)^1/2 of deviatoric stresses (D, D, N).
+
+    S has no trace, and in 1-D and 2-D the normal stresses of the other directions are equal.
+    """
+    D, trace = len(S), np.einsum("iin->n", S)
+    squares = (S * S).sum(axis=(0, 1))
+    if D < 3:
+        squares = squares + trace**2 / (3 - D)
+    return np.sqrt(1.5 * squares)
+
+
 @dataclass(frozen=True)
 class State:
     """A checkpoint as the pictures ask for it."""
@@ -140,10 +152,23 @@ class State:
     def when(self) -> str:
         return f"$t$ = {self.time:.4g}"
 
+    @property
+    def is_solid(self) -> bool:
+        return self.particles.get("deviatoric_stress") is not None
+
+    @property
+    def has_surface(self) -> bool:
+        """Whether matter ends at the particles' outer layer: gas would expand, others do not."""
+        return self.checkpoint.config.physics.formulation == "continuum"
+
     def scalar(self, name: str) -> np.ndarray:
-        """(N,) density, pressure, internal_energy, speed |v|, or stress -sigma_xx of a solid."""
+        """Return a quantity (N,): density, pressure, internal_energy, plastic_strain, speed |v|,
+        von_mises, or stress, which is -sigma_xx of a solid.
+        """
         if name == "speed":
             return np.linalg.norm(self.particles.velocity, axis=0)
+        if name == "von_mises":
+            return von_mises(self.particles.deviatoric_stress)
         if name == "pressure":
             return self.checkpoint.pressure
         if name == "stress":

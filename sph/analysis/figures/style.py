@@ -23,9 +23,15 @@ SYMBOLS = {
     "internal_energy": r"$u$",
     "stress": r"$-\sigma_{xx}$",
     "speed": r"$|\mathbf{v}|$",
+    "plastic_strain": r"$\varepsilon_p$",
+    "von_mises": r"$\sigma_{\mathrm{vM}}$",
 }
+TITLES = {"plastic_strain": "plastic strain", "von_mises": "von Mises stress"}
 # Perceptually uniform, one a field, so that a reader does not take one for another.
-MAPS = {"density": "viridis", "pressure": "inferno", "speed": "cividis"}
+MAPS = {
+    "density": "viridis", "pressure": "inferno", "speed": "cividis", "plastic_strain": "magma",
+    "von_mises": "plasma",
+}  # fmt: skip
 VACUUM = "0.85"
 MOST_DECADES = 4
 

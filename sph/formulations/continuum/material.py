@@ -59,8 +59,9 @@ def stresses(
         sound_speed[i] = c
         if balsara is not None:
             size, curl = abs(div_v[i]), _curl(dim, velocity_gradient, i)
-            # the support is 2 d
-            balsara[i] = size / (size + curl + 2.0 * SOFTENING * c / support[i])
+            # the support is 2 d; cold matter at rest has nothing to switch
+            whole = size + curl + 2.0 * SOFTENING * c / support[i]
+            balsara[i] = size / whole if whole != 0.0 else 0.0
         if pressure is not None:
             pressure[i] = P
         if stress is not None:

@@ -1,8 +1,8 @@
 """Particle placement: lattices of cells of equal volume, noise, and a disordered glass.
 
 Every lattice is a stack of layers along x. A layer holds the sites of a rectangular grid in y and
-z. Layers of two-site cells (hexagonal, BCC) alternate between two offsets. Sites lie inside the
-cells, so no particle lies on a face of the box, and periodic images continue the lattice.
+z. Layers of two-site cells (hexagonal, BCC, FCC) alternate between two offsets. Sites lie inside
+the cells, so no particle lies on a face of the box, and periodic images continue the lattice.
 """
 
 from typing import NamedTuple
@@ -24,13 +24,14 @@ _STAGGERED = (0.25, 0.75)
 
 
 def unit_cell(kind: str, dimension: int) -> Cell:
-    """Return the cell of "cubic" (any dimension), "hexagonal" (2-D) or "bcc" (3-D).
+    """Return the cell of "cubic" (any dimension), "hexagonal" (2-D), "bcc" or "fcc" (3-D).
 
+    FCC, the closest packing of spheres, is BCC whose cell is longer along x by the root of 2.
     Raises ValueError for another name or dimension.
     """
     if kind == "cubic":
         return Cell((1.0,) * dimension, ((0.5,) * dimension,))
-    own_dimension = {"hexagonal": 2, "bcc": 3}.get(kind)
+    own_dimension = {"hexagonal": 2, "bcc": 3, "fcc": 3}.get(kind)
     if own_dimension is None:
         raise ValueError(f'lattice "{kind}": expected "cubic", "hexagonal" (2-D) or "bcc" (3-D)')
     if dimension != own_dimension:
@@ -39,8 +40,8 @@ def unit_cell(kind: str, dimension: int) -> Cell:
             f'lattice "{kind}" exists only in {own_dimension}-D; expected {instead} in '
             f"{dimension}-D"
         )
-    sides = (1.0, np.sqrt(3.0)) if kind == "hexagonal" else (1.0,) * 3
-    return Cell(sides, tuple((offset,) * dimension for offset in _STAGGERED))
+    sides = {"hexagonal": (1.0, np.sqrt(3.0)), "fcc": (np.sqrt(2.0), 1.0, 1.0)}
+    return Cell(sides.get(kind, (1.0,) * 3), tuple((offset,) * dimension for offset in _STAGGERED))
 
 
 def checked(kind: str, dimension: int | None) -> str:

@@ -63,9 +63,10 @@ ENDS = {
     "keplerian_ring": ("keplerian_ring", (), 0.15 / math.sqrt(5e-6 / 3), "ring's edges"),
 }  # fmt: skip
 FOR_EVER = {
-    "blast_waves", "blob", "contrast", "elastic_bar", "expanding_ball", "gresho",
-    "kelvin_helmholtz", "kelvin_helmholtz_smooth", "particles", "polytrope", "rayleigh_taylor",
-    "square", "uniform", "yee",
+    "blast_waves", "blob", "bodies", "contrast", "elastic_bar", "expanding_ball", "gresho",
+    "hydrostatic_tank", "kelvin_helmholtz", "kelvin_helmholtz_smooth", "oscillating_plate",
+    "particles", "polytrope", "rayleigh_taylor", "rotating_disc", "rubber_rings", "square",
+    "taylor_bar", "uniform", "yee",
 }  # fmt: skip
 
 

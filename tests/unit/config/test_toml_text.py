@@ -24,6 +24,8 @@ three = { m = \"""a""\""", n = \"""b"\""", o = "c" }
 [[many]]
 j = 1.5
 [many.k]
+[[many]]
+j = 2.5
 """
 
 
@@ -36,6 +38,8 @@ def test_key_lines_are_where_keys_begin():
         ("a", "b", "quoted key", "x"): 4,
         ("a", "b", "text"): 7,
         ("a", "b", "list"): 8,
+        ("a", "b", "list", 1): 10,
+        ("a", "b", "list", 1, "d"): 10,
         ("a", "b", "inline"): 12,
         ("a", "b", "inline", "e"): 12,
         ("a", "b", "inline", "f"): 12,
@@ -48,8 +52,11 @@ def test_key_lines_are_where_keys_begin():
         ("a", "b", "three", "n"): 14,
         ("a", "b", "three", "o"): 14,
         ("many",): 15,
-        ("many", "j"): 16,
-        ("many", "k"): 17,
+        ("many", 0): 15,
+        ("many", 0, "j"): 16,
+        ("many", 0, "k"): 17,
+        ("many", 1): 18,
+        ("many", 1, "j"): 19,
     }
 
 

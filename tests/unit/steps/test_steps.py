@@ -20,6 +20,9 @@ CONTACTS = 'physics.conductivity={ name = "pressure_jump", switched = true }'
 FIELD = 'physics.external={ name = "point_mass", mass = 0.1, softening = 0.2 }'
 HEATING = 'physics.heating={ name = "relaxation", energy = 2.0, time = 0.1 }'
 TWO = ("problem.dimension=2", "problem.domain=[[-0.5, 0.5], [0.0, 0.1]]", "problem.n=300")
+PLASTIC = 'physics.strength={ name = "elastic_plastic", shear_modulus = 0.5, yield_stress = 0.05 }'
+FORMULATION = "physics.formulation=continuum"
+SOLID = (FORMULATION, PLASTIC, "physics.tensile_correction=0.3")
 OPEN = ("problem.boundary=open", "physics.max_support=0.05")
 
 SCENES = {
@@ -32,12 +35,17 @@ SCENES = {
     "single precision": ("run.precision=single",),
     "field": (FIELD, RANGE),
     "heating": (HEATING,),
+    "fluid by continuity": (FORMULATION,),
+    "solid": (*TWO, *SOLID),
+    "counted corrections": (*TWO, *SOLID, "physics.correction=1"),
 }
-IN_PYTHON = {"field", "heating"}
+IN_PYTHON = {"field", "heating", "counted corrections"}
 
 
 def started(*settings):
     text = '[problem]\nname = "shock_tube"\nn = 80\n[time]\nend = 0.2\n'
+    if FORMULATION in settings:  # the keys of another one would remain
+        text += '[physics]\nformulation = "continuum"\n'
     return Simulation.start(Scene(config.from_text(text).override(settings)), 1, Clock())
 
 

@@ -1,0 +1,84 @@
+"""Bodies that collide: what is conserved, how far a bar is shortened, and that rings bounce."""
+
+import numpy as np
+import pytest
+
+from sph.formulations.continuum import pieces
+
+
+def torn(outcome) -> dict:
+    simulation = outcome.simulation
+    return pieces.of(simulation.particles, simulation.scene.domain).torn
+
+
+def figures(outcome) -> dict[str, float]:
+    """The figures from the history, which here has a row for each step."""
+    config = outcome.simulation.scene.config
+    rows = outcome.diagnostics
+    history = {name: np.array([row[name] for row in rows]) for name in rows[0]}
+    history["t"] = np.array(outcome.times)
+    return config.problem.over_time(config.physics.eos_model(), history)
+
+
+# --- the bar ----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("dimension", "n", "radius_error"),
+    # Finite elements give 0.811 and 0.8124 of the length, within 3 % of which the program is to be
+    # at any resolution. The foot is thinner than 10 spacings: 2 and 5 % were measured.
+    [(2, 340, 0.08), (3, 700, 0.08)],
+)
+def test_bar_is_shortened_as_by_finite_elements(run, dimension, n, radius_error):
+    outcome = run("taylor_bar", f"problem.dimension={dimension}", f"problem.n={n}")
+    found = figures(outcome)
+    assert found["length_error"] < 0.03
+    assert found["radius_error"] < radius_error
+    assert outcome.energy_drift < 1e-3  # of the kinetic energy, which all becomes heat
+    # it has stopped: at 200 m/s the kinetic energy is 80 times that of elastic vibrations
+    assert outcome.simulation.totals.kinetic_energy < 0.01 * outcome.energies[0]
+    assert not torn(outcome)
+
+
+# --- the rings --------------------------------------------------------------------------------
+
+RINGS = ("problem.n=1100", "physics.allow_tearing=true")
+
+
+@pytest.mark.slow
+def test_rings_bounce_unbroken_with_tensile_correction(run):
+    outcome = run("rubber_rings", *RINGS)
+    found = figures(outcome)
+    assert not torn(outcome)
+    assert 0.5 < found["restitution"] < 0.8  # 0.6 to 0.7 were measured at all resolutions
+    assert outcome.energy_drift < 5e-4
+    for momentum in outcome.momenta:
+        assert np.abs(momentum).max() < 1e-12 * 2.0  # of the two rings' momenta of 1
+
+
+@pytest.mark.slow
+def test_rings_break_without_tensile_correction(run):
+    outcome = run("rubber_rings", *RINGS, "physics.tensile_correction=0.0", "time.end=1.6e-4")
+    assert torn(outcome)
+
+
+# --- several bodies ---------------------------------------------------------------------------
+
+FEW = ("problem.n=600", "time.end=6e-6")
+
+
+def test_disc_hands_its_momentum_to_plate_of_another_material(run):
+    outcome = run("bodies", *FEW)
+    start, end = outcome.momenta[0], outcome.momenta[-1]
+    assert np.abs(end - start).max() < 1e-12 * np.abs(start).max()  # round-off
+    found = outcome.report()
+    assert found["body_0_velocity_x"] < 780.0  # of 800
+    mass = np.array([7850.0 * np.pi * 0.005**2, 2785.0 * 0.004 * 0.04])
+    gained = found["body_1_velocity_x"] * mass[1]
+    assert gained == pytest.approx((800.0 - found["body_0_velocity_x"]) * mass[0], rel=1e-9)
+    p = outcome.particles
+    plate = p.material == 1.0
+    # equal pressure behind the shocks into both gives 525 m/s, a free surface twice as much
+    assert 525.0 < p.velocity[0, plate].max() < 1050.0
+    assert p.plastic_strain[plate].max() > 0.05
+    assert outcome.energy_drift < 1e-3
