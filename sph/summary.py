@@ -82,6 +82,13 @@ class Nearest(TypedDict):
     smallest: float
 
 
+class Tearing(TypedDict):
+    """Solid bodies, and their connected pieces at the end of the run (eq 454)."""
+
+    bodies: int
+    pieces: int
+
+
 class Session(TypedDict):
     """Cost of the last session, that is of one call of `sph run` or `sph restart`."""
 
@@ -132,6 +139,7 @@ class Summary(TypedDict):
     report: dict[str, float] | None  # the problem's own figures; None where the run failed
     conservation: Conservation
     nearest: Nearest | None  # None where the run failed
+    tearing: NotRequired[Tearing]  # not without solid bodies, nor where the run failed
     cost: Cost
     compiled_in: list[str]  # parts of the scene
     left_out: list[str]  # parts that the scene does without

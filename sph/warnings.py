@@ -8,7 +8,7 @@ from collections.abc import Iterator, Mapping
 from typing import NamedTuple
 
 from sph import resolution
-from sph.summary import Conservation, Nearest, Summary, figure
+from sph.summary import Conservation, Nearest, Summary, Tearing, figure
 
 # Limit of the stress suite for settings that pass; a larger drift is an error of time integration.
 DRIFT = 1e-3
@@ -47,6 +47,7 @@ def of_run(simulation, summary: Summary) -> list[Warning]:
         *_held(simulation),
         *_resolution(simulation),
         *_paired(summary["nearest"], neighbours),
+        *_torn(summary.get("tearing")),
         *_limits(problem, summary, precision),
     ]
 
@@ -135,6 +136,17 @@ def _paired(nearest: Nearest | None, neighbours: str) -> Iterator[Warning]:
             f"neighbour is {nearest['median']:.2g} of the particle spacing, so the resolution is "
             "lower than the number of particles suggests. Try a Wendland kernel, or a smaller "
             f"{neighbours}.",
+        )
+
+
+def _torn(found: Tearing | None) -> Iterator[Warning]:
+    if found and found["pieces"] > found["bodies"]:
+        number = found["bodies"]
+        bodies = "1 solid body is" if number == 1 else f"{number} solid bodies are"
+        yield Warning(
+            "torn",
+            f"{bodies} in {found['pieces']} pieces. The equations contain no law of fracture, so "
+            "where a body tears depends on the particles. Try physics.tensile_correction = 0.3.",
         )
 
 

@@ -53,6 +53,8 @@ def of_run(
         result["nearest"] = {
             "median": float(np.median(nearest)), "smallest": float(nearest.min())
         }  # fmt: skip
+        if found := scene.formulation.pieces(particles):
+            result["tearing"] = {"bodies": found.bodies, "pieces": found.pieces}
     warn(result, simulation)
     return result
 

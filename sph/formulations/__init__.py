@@ -50,5 +50,9 @@ class Formulation(Part):
         """
         return [(PRESSURE, self.pressure(state))]
 
+    def pieces(self, state: State) -> Any:
+        """Return solid bodies and their connected pieces, or None if there are no solids."""
+        return None
+
 
 BASE = Formulation

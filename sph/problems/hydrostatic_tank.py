@@ -32,7 +32,10 @@ class Problem(base.Problem):
         "time.end": 3.0,
         "output.interval": 0.5,
     }
-    limits: ClassVar = {}
+    limits: ClassVar = {
+        "energy_drift": base.Limit(1e-4, "water at rest"),
+        "pressure_error": base.Limit(0.02, "of the pressure at the bottom"),
+    }
     profiled: ClassVar = False
 
     name: Literal["hydrostatic_tank"] = "hydrostatic_tank"
@@ -110,6 +113,9 @@ class Problem(base.Problem):
         }
 
     def departs(self, physics) -> str | None:
+        field = registry.model("sph.parts.external", physics.external)
+        if tuple(getattr(field, "g", ())) != (0.0, -self._g):
+            return "the exact pressure is for a uniform field, but physics.external is another"
         return base.other_physics(physics, besides="external")
 
     def diagnostics(self, particles) -> dict[str, float]:

@@ -49,11 +49,13 @@ def test_gap_tears_where_supports_end(gap, count):
     assert pieces.of(state, OPEN).pieces == count
 
 
-def test_larger_support_of_a_pair_links():
+def test_mean_support_of_a_pair_links():
     state = started(bar(2, rows=1))
     state.position[0, 1] = 3.0
     assert pieces.of(state, OPEN).pieces == 2
-    state.support[1] = 3.1
+    state.support[1] = 3.5
+    assert pieces.of(state, OPEN).pieces == 2
+    state.support[1] = 3.7
     assert pieces.of(state, OPEN).pieces == 1
 
 

@@ -225,7 +225,7 @@ def test_bar_that_yields_has_no_theory():
 
 def test_periodic_bar_of_odd_mode_is_refused(messages):
     with messages.raised(ConfigError, "mode = 3", "even"):
-        made("elastic_bar", "problem.mode=3")
+        made("elastic_bar", "problem.mode=3", "problem.boundary=periodic")
 
 
 # --- all --------------------------------------------------------------------------------------

@@ -69,7 +69,7 @@ class Continuum(Formulation):
             "dimensions; the support radius is 2 d; larger values give more neighbours",
             kind=float,
             default=1.2,
-            above=0.0,
+            at_least=0.9,  # gradients on a lattice are 4 % too small, and 16 to 20 % at 0.8
         ),
         Key(
             "correction",
@@ -327,6 +327,9 @@ class Continuum(Formulation):
             found[there] = formula(one, state.density[there], state.internal_energy[there])
         return found
 
+    def pieces(self, state):
+        return pieces.of(state, self.domain) if self.is_solid else None
+
     def sums(self, state):
         """Return corrections_failed: the number of particles at which order 1 fell back to 0."""
         if self.order != 1:
@@ -391,9 +394,6 @@ class Continuum(Formulation):
                 "equation of state that holds at this density",
                 int(p.id[i]),
             )
-
-    def pieces(self, state):
-        return pieces.of(state, self.domain) if self.is_solid else None
 
     def check_output(self, simulation):
         """Raise NumericalError if a solid body has torn."""

@@ -4,9 +4,9 @@ The equations contain no law of fracture. A body that tears does so because its 
 out of the supports of their neighbours, often by the tensile instability, so where and when it
 tears depends on the arrangement of the particles.
 
-Two particles of a body are linked if they exert forces on each other: if one is within the support
-of the other. No shorter distance would do: material that is stretched along one axis and compressed
-along another has neighbours at several times the particle spacing.
+Two particles of a body are linked if they exert forces on each other: if their distance is less
+than the mean of their support radii (eq 401). No shorter distance would do: material that is
+stretched along one axis and compressed along another has neighbours at several particle spacings.
 """
 
 from typing import NamedTuple
@@ -115,7 +115,7 @@ def _connected(position, support, members, domain: Domain) -> tuple[int, np.ndar
         first, second = tree.query_pairs(share * H.max(), output_type="ndarray").T
         apart = inside[:, first] - inside[:, second]
         apart -= period * np.round(apart / length)
-        near = (apart**2).sum(axis=0) < (share * np.maximum(H[first], H[second])) ** 2
+        near = (apart**2).sum(axis=0) < (share * 0.5 * (H[first] + H[second])) ** 2
         links = (np.ones(near.sum(), dtype=bool), (first[near], second[near]))
         graph = coo_matrix(links, shape=(members.size, members.size))
         count, label = connected_components(graph, directed=False)

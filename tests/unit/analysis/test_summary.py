@@ -102,7 +102,8 @@ def summary_of(monkeypatch):
             time=SimpleNamespace(end=9.0),
         )  # fmt: skip
         particles = SimpleNamespace(number=3, position=None)
-        formulation = SimpleNamespace(pressure=lambda state: None)
+        torn = SimpleNamespace(bodies=1, pieces=3)
+        formulation = SimpleNamespace(pressure=lambda state: None, pieces=lambda state: torn)
         simulation = SimpleNamespace(
             scene=SimpleNamespace(
                 config=config, dimension=2, formulation=formulation,
@@ -130,7 +131,8 @@ def test_summary_finished_run_has_every_entry(summary_of):
         "settings_changed": ["physics.alpha = 2.0 (was 1.0) at t = 0.125"],
         "errors": "errors", "errors_left_out": "why not", "report": "figures",
         "conservation": "conservation", "nearest": {"median": 0.9, "smallest": 0.2},
-        "cost": "cost", "compiled_in": ["i"], "left_out": ["o"],
+        "tearing": {"bodies": 1, "pieces": 3}, "cost": "cost", "compiled_in": ["i"],
+        "left_out": ["o"],
     }  # fmt: skip
 
 

@@ -64,8 +64,9 @@ ENDS = {
 }  # fmt: skip
 FOR_EVER = {
     "blast_waves", "blob", "bodies", "contrast", "elastic_bar", "expanding_ball", "gresho",
-    "kelvin_helmholtz", "kelvin_helmholtz_smooth", "particles", "polytrope", "rayleigh_taylor",
-    "rubber_rings", "square", "taylor_bar", "uniform", "yee",
+    "hydrostatic_tank", "kelvin_helmholtz", "kelvin_helmholtz_smooth", "oscillating_plate",
+    "particles", "polytrope", "rayleigh_taylor", "rotating_disc", "rubber_rings", "square",
+    "taylor_bar", "uniform", "yee",
 }  # fmt: skip
 
 
