@@ -167,7 +167,10 @@ def resolve(
             found[name] = model.model_validate(_without(raw[name], spoilt))
         except ValidationError as error:
             details = _details(error, problem is not None, bool(spoilt))
-            elsewhere = _tables_of_keys(models, besides=name)
+            tables = _tables_of_keys(models, besides=name)
+            elsewhere = {key: f"in [{one}]" for key, one in tables.items()}
+            if name == "physics":
+                elsewhere |= physics.keys_of_other_formulations(raw["physics"])
             issues += explain(model, raw[name], details, name, elsewhere)
         except ArithmeticError as error:  # in a validator, such as the count of lattice cells
             text = f": {error}; expected numbers closer to 1, and domain sides of similar length"
