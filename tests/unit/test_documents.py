@@ -138,12 +138,14 @@ def test_contributing_has_example_for_each_folder():
     }  # fmt: skip
 
 
-def of_folder(kind: type) -> dict:
-    """The attributes that files of its folder define, in this class or in one that it extends."""
-    folder = kind.__module__.rpartition(".")[0]
-    bases = [one for one in kind.__mro__ if one.__module__.rpartition(".")[0] == folder]
-    shared = [vars(one) for one in bases if not one.__module__.endswith(".base")]
-    return {name: value for one in reversed(shared) for name, value in one.items()}
+def own_names(kind, folder):
+    """What a class defines, or another class of its folder from which it inherits."""
+    package = folder.replace("/", ".")
+    found = {}
+    for one in reversed(kind.__mro__):
+        if one.__module__.startswith(package) and not one.__module__.endswith(".base"):
+            found |= vars(one)
+    return found
 
 
 @pytest.mark.parametrize(("folder", "name", "code"), EXAMPLES, ids=[one[1] for one in EXAMPLES])
@@ -155,7 +157,7 @@ def test_example_defines_names_common_to_its_folder(folder, name, code):
         for kind in defined.values()
         if isinstance(kind, type) and kind.__module__ == defined["__name__"]
     )
-    siblings = [of_folder(kind) for kind in models(folder.replace("/", "."))]
+    siblings = [own_names(kind, folder) for kind in models(folder.replace("/", "."))]
     common = set.intersection(*(set(one) for one in siblings))
     methods = {one for one in common if inspect.isfunction(siblings[0][one]) and one[0] != "_"}
     methods -= {"enclosed_over_q3", "potential_depth"}  # only for gravity; a kernel may lack them
