@@ -254,7 +254,7 @@ def explain(
 ) -> list[Issue]:
     """Return one issue for each error that pydantic found in `raw`, the table named `table`.
 
-    `elsewhere` maps each key of the other tables to its table.
+    `elsewhere` maps each key that belongs elsewhere to where that is, such as "in [physics]".
     """
     located = [_locate(error, raw) for error in errors]
     unions = defaultdict(list)
@@ -294,9 +294,9 @@ def _unknown_key(path: Path, holder: Any, elsewhere: dict[str, str]) -> Issue:
 def unknown_key(path: Path, valid: Iterable[str], elsewhere: dict[str, str]) -> Issue:
     """Return the issue that the last step of `path` is not a key of its table.
 
-    `valid` holds the keys of the table; `elsewhere` maps keys of other tables to their table.
+    `valid` holds the keys of the table; `elsewhere` maps other keys to where they belong.
     """
     key, table = str(path[-1]), dotted(path[:-1])
     if key in elsewhere:
-        return Issue(path, f"is not a key of [{table}]: {key} belongs in [{elsewhere[key]}]")
+        return Issue(path, f"is not a key of [{table}]: {key} belongs {elsewhere[key]}")
     return Issue(path, f"is not a key of [{table}]; {suggestion(key, valid)}")

@@ -168,6 +168,16 @@ def chosen(raw: dict[str, Any]) -> type[Physics]:
     return table(name if name in known else DEFAULT)
 
 
+def keys_of_other_formulations(raw: dict[str, Any]) -> dict[str, str]:
+    """Return which formulations have a key that the formulation of a raw table lacks, in words."""
+    own, found = chosen(raw), {}
+    for name in registry.names(FORMULATIONS, folders=True):
+        for key in table(name).model_fields.keys() - own.model_fields.keys():
+            of = f'to physics.formulation = "{name}"'
+            found[key] = f"{found[key]} or {of}" if key in found else of
+    return found
+
+
 def model_folders() -> dict[str, str]:
     """Return the folder of models of each key, e.g. "sph.parts.heating", with its short name."""
     known = registry.names(FORMULATIONS, folders=True)

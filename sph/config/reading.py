@@ -24,7 +24,12 @@ from sph.errors import ConfigError, DeclarationError, FileError
 from sph.problems.base import Problem, Section
 
 # Keys that exclude each other: if the user gives one, the default of the other is not used.
-_IN_PLACE_OF = {"physics.eos": "gamma", "physics.gamma": "eos"}
+_IN_PLACE_OF = {
+    "physics.eos": ("gamma", "materials"),
+    "physics.gamma": ("eos", "materials"),
+    "physics.strength": ("materials",),
+    "physics.materials": ("eos", "gamma", "strength"),
+}
 
 
 class Source(NamedTuple):
@@ -114,7 +119,7 @@ def _set(source: Source, override: str) -> None:
             table[step] = {}
         table = table[step]
     table[path[-1]] = _value(text)
-    if other := _IN_PLACE_OF.get(dotted(path[:2])):
+    for other in _IN_PLACE_OF.get(dotted(path[:2]), ()):
         source.tables[path[0]].pop(other, None)
     for old in [old for old in source.places if old[: len(path)] == path]:
         del source.places[old]
@@ -162,7 +167,10 @@ def resolve(
             found[name] = model.model_validate(_without(raw[name], spoilt))
         except ValidationError as error:
             details = _details(error, problem is not None, bool(spoilt))
-            elsewhere = _tables_of_keys(models, besides=name)
+            tables = _tables_of_keys(models, besides=name)
+            elsewhere = {key: f"in [{one}]" for key, one in tables.items()}
+            if name == "physics":
+                elsewhere |= physics.keys_of_other_formulations(raw["physics"])
             issues += explain(model, raw[name], details, name, elsewhere)
         except ArithmeticError as error:  # in a validator, such as the count of lattice cells
             text = f": {error}; expected numbers closer to 1, and domain sides of similar length"
@@ -261,7 +269,7 @@ def _fill_defaults(
         table, name = key.split(".", 1)
         if name not in models[table].model_fields:
             continue
-        if _IN_PLACE_OF.get(key) not in raw[table]:
+        if not any(other in raw[table] for other in _IN_PLACE_OF.get(key, ())):
             raw[table].setdefault(name, value)
 
 

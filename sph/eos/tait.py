@@ -7,8 +7,14 @@ negative below rho_0.
 
 from typing import Annotated, NamedTuple
 
+import numpy as np
+
 from sph.eos import Defaults
+from sph.errors import ConfigError
 from sph.model import Parameter, model
+
+# Of rho_0 c_0^2, up to which two pressures are equal.
+TOLERANCE = 1e-9
 
 
 @model(Defaults)
@@ -31,5 +37,20 @@ class Tait(NamedTuple):
         return self.c_0 * (density / self.rho_0) ** (0.5 * (self.gamma - 1.0))  # eq 421
 
     def internal_energy(self, density, pressure):
-        # the pressure does not depend on u, which initial states count from zero
+        """Return 0: the pressure does not depend on u, which initial states count from zero.
+
+        Raises ConfigError for a pressure that is neither 0 nor that of the density.
+        """
+        own = self.pressure(density, 0.0)
+        differ = np.abs(pressure - own) > TOLERANCE * self.rho_0 * self.c_0**2
+        wrong = np.atleast_1d(differ & (np.asarray(pressure) != 0.0))
+        if wrong.any():
+            rho, asked, own = (
+                np.broadcast_to(one, wrong.shape)[wrong][0] for one in (density, pressure, own)
+            )
+            raise ConfigError(
+                f"the initial state has pressure {asked:g} at density {rho:g}, but "
+                f'physics.eos "tait" gives {own:g} there, whatever the energy. Try: a density or '
+                "pressure that agree, or an equation of state with internal energy"
+            )
         return 0.0 * density

@@ -171,10 +171,17 @@ def _header(checkpoint, frame: Frame) -> dict[str, Mapping]:
             "Dimension": np.array([dimension]),
             "Scheme": np.bytes_(checkpoint.scene.formulation.label),
             "Kernel function": np.bytes_(physics.kernel_model().name),
-            "Kernel eta": np.array([checkpoint.scene.formulation.models.eta]),
+            "Kernel eta": np.array([_eta(checkpoint)]),
             "CFL parameter": np.array([physics.C]),
         },
     }
+
+
+def _eta(checkpoint) -> float:
+    """Return h over the particle spacing, for h of the attribute `SmoothingLengths`."""
+    models, dimension = checkpoint.scene.formulation.models, checkpoint.particles.dimension
+    # the formulation may have another smoothing length
+    return models.eta * (models.support_ratio / kernels.support_ratio(models.kernel, dimension))
 
 
 def _equation_of_state(eos) -> dict:

@@ -55,7 +55,7 @@ class Problem(base.Problem):
         "list with one [lo, hi] per axis",
     )
     boundary: Literal["open", "periodic"] = Field(
-        default="periodic",
+        default="open",
         description='ends of the bar: "open" (free) or "periodic"; y and z are periodic',
     )
     amplitude: float = Field(

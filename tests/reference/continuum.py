@@ -5,11 +5,13 @@ images and kernels are those of `dense`. Equations "R" are those of the second s
 Code units throughout; vectors are (D, N), tensors (D, D, N), scalars (N,). L[a, b] is dv_a/dx_b.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import NamedTuple
 
 import dense
 import numpy as np
+from scipy.linalg import expm
 
 WORST_CONDITION = 1e6  # of the matrix of order 1, beyond which a particle takes order 0
 
@@ -347,3 +349,86 @@ def rates(scene: Scene, matter: Matter) -> Rates:
 def time_step(scene: Scene, matter: Matter, now: Rates) -> float:
     """0.3 d/(Q + sqrt(Q^2 + c^2)), the smallest of all particles."""
     return (0.6 * scene.lengths(matter.mass, matter.density) / now.signal_speed).min()
+
+
+# --- the step ---
+
+
+class Law(NamedTuple):
+    """What the materials of all particles make of density, energy and a trial deviator."""
+
+    pressure: np.ndarray
+    sound_speed: np.ndarray
+    shear_modulus: np.ndarray
+    deviator: np.ndarray  # (D, D, N), on the yield surface or within it
+    plastic_strain: np.ndarray  # its increment by the return
+
+
+@dataclass
+class Body:
+    """Corrected values at one time, and the rates of the last evaluation.
+
+    `law(density, energy, deviator)` returns a Law.
+    """
+
+    scene: Scene
+    law: Callable[..., Law]
+    position: np.ndarray
+    velocity: np.ndarray
+    mass: np.ndarray
+    density: np.ndarray
+    energy: np.ndarray
+    deviator: np.ndarray
+    plastic_strain: np.ndarray
+    rest_density: np.ndarray
+    rates: Rates | None = None
+    shear_modulus: np.ndarray | None = None
+
+    def evaluate(self, velocity, density, energy, deviator):
+        """Rates at the present position and the predicted values."""
+        now = self.law(density, energy, deviator)
+        unit = np.eye(len(velocity))[:, :, None]
+        stress = now.deviator - now.pressure * unit
+        matter = Matter(
+            self.position, velocity, self.mass, density, stress, now.sound_speed, self.rest_density
+        )
+        self.rates, self.shear_modulus = rates(self.scene, matter), now.shear_modulus
+
+    def start(self):
+        """The rates at t = 0."""
+        self.evaluate(self.velocity, self.density, self.energy, self.deviator)
+
+    def advance(self, dt):
+        """One step: prediction, rates, correction (eqs 1-6 and 29-31 for every quantity).
+
+        S changes by Hooke's law in half steps, between which the rotation of half a step turns it.
+        """
+        half, old = 0.5 * dt, self.rates
+        self.position = self.position + self.velocity * dt + 0.5 * old.acceleration * dt**2
+        change = half * deviatoric_rate(old.velocity_gradient, self.shear_modulus)
+        self.deviator = turned(self.deviator + change, old.velocity_gradient, half)
+        predicted = (
+            self.velocity + old.acceleration * dt,
+            self.density + old.density_rate * dt,
+            self.energy + old.energy_rate * dt,
+            turned(self.deviator, old.velocity_gradient, half) + change,
+        )
+        self.velocity = self.velocity + old.acceleration * half
+        self.density = self.density + old.density_rate * half
+        self.energy = self.energy + old.energy_rate * half
+        self.evaluate(*predicted)
+        new = self.rates
+        self.velocity = self.velocity + new.acceleration * half
+        self.density = self.density + new.density_rate * half
+        self.energy = self.energy + new.energy_rate * half
+        change = half * deviatoric_rate(new.velocity_gradient, self.shear_modulus)
+        trial = turned(self.deviator, new.velocity_gradient, half) + change
+        now = self.law(self.density, self.energy, trial)
+        self.deviator = now.deviator
+        self.plastic_strain = self.plastic_strain + now.plastic_strain
+
+
+def turned(tensor, velocity_gradient, time):
+    """(D, D, N) the tensor turned with the spin for a time."""
+    turn = expm(time * spin(velocity_gradient).transpose(2, 0, 1))
+    return np.einsum("nac,cdn,nbd->abn", turn, tensor, turn)

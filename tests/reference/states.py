@@ -5,8 +5,13 @@ from sph.parts.viscosity import ALPHA, ALPHA_RATE
 from sph.state import State
 
 
-def gas_state(position, velocity, mass, internal_energy, alpha=None) -> State:
-    """Particles at the start, with nothing computed yet; alpha: one number if it evolves."""
+def gas_state(
+    position, velocity, mass, internal_energy, others=None, alpha=None
+) -> State:  # fmt: skip
+    """Particles at the start, with nothing computed yet; alpha: one number if it evolves.
+
+    others: what an initial state holds besides, which gas does not need.
+    """
     fields = gas.FIELDS if alpha is None else (*gas.FIELDS, ALPHA, ALPHA_RATE)
     state = State.at_start(fields, position, velocity, mass, internal_energy)
     if alpha is not None:

@@ -219,14 +219,12 @@ def test_spacing_before_supports_is_box_average(dimension, gap, is_refused):
 
 def test_spacing_is_support_over_spacings_per_support():
     """H is 4 spacings; a particle without a support has an error of its own."""
-    eos = SimpleNamespace(
-        pressure=lambda density, energy: density * energy,
-        sound_speed=lambda density, p: p / density,
-    )
     simulation = SimpleNamespace(
         scene=SimpleNamespace(
-            formulation=SimpleNamespace(models=SimpleNamespace(support_ratio=2.5, eta=1.6)),
-            eos=eos,
+            formulation=SimpleNamespace(
+                models=SimpleNamespace(support_ratio=2.5, eta=1.6),
+                sound_speed=lambda p: p.internal_energy,
+            ),
         ),
         particles=SimpleNamespace(
             mass=np.ones(3), density=np.array([1.0, 1.0, -1.0]), internal_energy=np.ones(3),

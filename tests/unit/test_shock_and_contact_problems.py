@@ -58,7 +58,7 @@ def test_noh_gas_is_infalling_ball(keys, volume):
     # the surface of a lattice's ball is ragged: some root of the number of cells it cuts
     assert state.mass.sum() == pytest.approx(volume, rel=0.01)
     np.testing.assert_allclose(state.velocity, -state.position / radius, rtol=1e-14)
-    assert all(array.flags.c_contiguous for array in state)  # as compiled code expects
+    assert all(array.flags.c_contiguous for array in state[:4])  # as compiled code expects
 
 
 def test_noh_part_of_ball_equals_whole_ball():

@@ -10,6 +10,7 @@ from sph import watchdog
 from sph.errors import NumericalError
 from sph.integrators import step_size
 from sph.scene import Scene
+from sph.state import COMMON
 
 
 def quiet(**changed):
@@ -31,6 +32,7 @@ def quiet(**changed):
         scene=SimpleNamespace(
             config=config, physics=physics, domain=domain, all_parts=(), is_single=False,
             step_bounds=step_size.Bounds(0.1, "signal_speed", False, False, 0.25),
+            formulation=SimpleNamespace(fields=COMMON, neighbours_key="physics.eta"),
         ),
         particles=SimpleNamespace(**arrays), totals=totals, energy_drift=0.0, volume_ratio=None,
         limit=step_size.StepLimit(1e-3, 12, "signal_speed"), time=0.0, step=5,

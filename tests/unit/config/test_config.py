@@ -524,3 +524,13 @@ def test_too_many_checkpoints_is_refused(messages):
     with messages.raised(ConfigError, "line 6", "output.interval"):
         config.from_text(text.format("1.9e-6"))
     assert config.from_text(text.format("2.1e-6")).output.interval == 2.1e-6
+
+
+@pytest.mark.parametrize(("formulation", "key", "owner"), [
+    ("continuum", "alpha", "gas"), ("continuum", "eta", "gas"), ("gas", "q_a", "continuum"),
+])  # fmt: skip
+def test_key_of_another_formulation_is_named(formulation, key, owner):
+    text = f'{MINIMAL}\n[physics]\nformulation = "{formulation}"\n{key} = 1.0\n'
+    assert only_error(text).endswith(
+        f'physics.{key} is not a key of [physics]: {key} belongs to physics.formulation = "{owner}"'
+    )

@@ -5,107 +5,37 @@ good, and with lists too small for the supports, so that they are widened on the
 """
 
 from dataclasses import dataclass
-from typing import Any
 
 import continuum
 import dense
 import numpy as np
 import pytest
+from continuum_scenes import (
+    ELASTIC,
+    GAS,
+    MIRROR,
+    OPEN,
+    PERIODIC,
+    PLASTIC,
+    WATER,
+    Case,
+    EagerTeam,
+    law_of,
+    pressure_of,
+    scene_of,
+)
 from marks import slow_except
 
-from sph import config, passes, simd
-from sph.config import physics
+from sph import passes, simd
 from sph.domain import Domain
 from sph.neighbours import order as ordering
 from sph.neighbours.search import Origin, Search
 from sph.problems import base
-from sph.scene import Scene
 from sph.state import State
-from sph.threads import Team
 
 # Of the sum of absolute pair terms, with the condition of order 1's matrix in it. Both sides do the
 # same sums in another order.
 ROUND_OFF = 1e-11
-PERIODIC, MIRROR, OPEN = "periodic", "mirror", "open"
-
-GAS = {"eos": {"name": "ideal_gas", "gamma": 1.4}}
-WATER = {"eos": {"name": "tait", "rho_0": 1.2, "c_0": 1.5}}
-ELASTIC = {
-    "eos": {"name": "tait", "rho_0": 0.9, "c_0": 1.3},
-    "strength": {"name": "elastic", "shear_modulus": 0.8},
-}
-PLASTIC = {
-    "eos": {"name": "tait", "rho_0": 1.1, "c_0": 1.7},
-    "strength": {"name": "elastic_plastic", "shear_modulus": 1.3, "yield_stress": 1.1},
-}
-
-
-class EagerTeam(Team):
-    """Hands over even a single block, which real teams find too little: N is small here."""
-
-    def run(self, function, items, *arguments, smallest=1):
-        return super().run(function, items, *arguments, smallest=1)
-
-
-@dataclass(frozen=True)
-class Case:
-    """What is compiled in: order, materials, tensile correction, Balsara's factor, kernel."""
-
-    boundaries: tuple[str, ...]
-    order: int
-    materials: tuple[dict, ...]
-    tensile: float = 0.0
-    balsara: bool = True
-    kernel: str = "cubic_spline"
-    thin: float = 1.0  # what is left of the last axis: supports are wider than it
-
-    def __str__(self):
-        parts = [f"{self.dimension}d", *self.boundaries, f"order {self.order}"]
-        parts += [
-            one.get("strength", one["eos"])["name"].replace("_", " ") for one in self.materials
-        ]
-        parts += ["tensile"] * (self.tensile > 0) + ["balsara"] * self.balsara
-        parts += [self.kernel] * (self.kernel != "cubic_spline")
-        parts += [f"thin {self.thin:g}"] * (self.thin != 1.0)
-        return "-".join(parts)
-
-    @property
-    def dimension(self):
-        return len(self.boundaries)
-
-    @property
-    def is_solid(self):
-        return any("strength" in one for one in self.materials)
-
-    @property
-    def yields(self):
-        return any(one.get("strength", {}).get("yield_stress") for one in self.materials)
-
-    @property
-    def spacing_ratio(self):
-        return (1.2, 1.1, 0.95)[self.dimension - 1]  # supports stay within the box
-
-    @property
-    def box(self):
-        box = np.array([[0.0, 1.0], [-0.5, 0.5], [1.0, 2.25]])[: self.dimension]
-        box[-1, 1] = box[-1, 0] + self.thin * (box[-1, 1] - box[-1, 0])
-        return box
-
-    @property
-    def dense_scene(self):
-        return continuum.Scene(
-            self.box,
-            self.boundaries,
-            kernel=self.kernel,
-            order=self.order,
-            spacing_ratio=self.spacing_ratio,
-            q_a=1.7,
-            q_b=0.8,
-            balsara=self.balsara,
-            tensile=self.tensile if self.is_solid else 0.0,
-        )
-
-
 CASES = [
     Case((OPEN,), 0, (GAS,)),
     Case((MIRROR,), 1, (ELASTIC,), tensile=0.3),
@@ -129,35 +59,6 @@ CASES = [
 # Together, the cases without the mark `slow` have every order, three dimensions, every boundary,
 # fluid and solid, two materials, and the tensile correction.
 MARKED = slow_except({1, 2, 5, 14}, CASES)
-
-
-# --- the laws of the materials, written out ---
-
-
-def pressure_of(material, density, energy):
-    """(pressure, bulk sound speed, what round-off in the pressure is measured by)."""
-    eos = material["eos"]
-    if eos["name"] == "ideal_gas":
-        p = (eos["gamma"] - 1) * density * energy
-        return p, np.sqrt(eos["gamma"] * p / density), p
-    c = eos["c_0"]
-    return c**2 * (density - eos["rho_0"]), np.full(density.size, c), c**2 * density
-
-
-def shear_modulus(material):
-    return material.get("strength", {}).get("shear_modulus", 0.0)
-
-
-def on_yield_surface(material, deviator):
-    """(D, D, N) S scaled down so that sqrt(3/2 S : S) is at most Y, with the components along
-    axes that the scene lacks: S_zz = -(S_xx + S_yy) in 2-D, S_yy = S_zz = -S_xx/2 in 1-D."""
-    limit, missing = material.get("strength", {}).get("yield_stress"), 3 - len(deviator)
-    if limit is None:
-        return deviator
-    squares = (deviator**2).sum(axis=(0, 1))
-    if missing:
-        squares = squares + np.trace(deviator) ** 2 / missing
-    return deviator * np.minimum(1.0, limit / np.sqrt(1.5 * squares))
 
 
 # --- particles ---
@@ -261,21 +162,14 @@ def random_matter(case, lists, seed=3):
 
 def expected_of(case, matter):
     """(rates of the transcription, further fields by name with their scales)."""
-    n, d = matter.mass.size, case.dimension
-    pressure, sound, scale, G = np.empty(n), np.empty(n), np.empty(n), np.empty(n)
-    deviator = matter.deviator.copy()
-    for index, one in enumerate(case.materials):
-        its = matter.material == index
-        pressure[its], sound[its], scale[its] = pressure_of(
-            one, matter.density[its], matter.energy[its]
-        )
-        G[its] = shear_modulus(one)
-        deviator[:, :, its] = on_yield_surface(one, deviator[:, :, its])
-    sound = np.sqrt(sound**2 + 4 / 3 * G / matter.density)
+    d, its = case.dimension, [matter.material == k for k in range(len(case.materials))]
+    now = law_of(case.materials, matter.material)(matter.density, matter.energy, matter.deviator)
     unit = np.eye(d)[:, :, None]
-    stress = deviator - pressure * unit
-    if not case.is_solid:
-        stress = -pressure * unit
+    stress = now.deviator - now.pressure * unit
+    scale = np.select(
+        its, [pressure_of(one, matter.density, matter.energy)[2] for one in case.materials]
+    )
+    G = now.shear_modulus
     rates = continuum.rates(
         case.dense_scene,
         continuum.Matter(
@@ -284,17 +178,17 @@ def expected_of(case, matter):
             matter.mass,
             matter.density,
             stress,
-            sound,
+            now.sound_speed,
             matter.initial_density,
         ),
     )
     L, L_scale = rates.velocity_gradient, rates.velocity_gradient_scale
-    stress_scale = continuum.norm(deviator) + scale
+    stress_scale = continuum.norm(now.deviator) + scale
     fields = {
         "support": (2 * case.dense_scene.lengths(matter.mass, matter.density), None),
-        "pressure": (pressure, scale),
-        "sound_speed": (sound, None),
-        "predicted_stress": (deviator, stress_scale),
+        "pressure": (now.pressure, scale),
+        "sound_speed": (now.sound_speed, None),
+        "predicted_stress": (now.deviator, stress_scale),
         "stress": (stress, stress_scale),
         # the antisymmetric part of the rate holds the spin
         "stress_rate": (
@@ -320,45 +214,6 @@ def expected_of(case, matter):
                  "signal_speed"):  # fmt: skip
         fields[name] = getattr(rates, name), getattr(rates, f"{name}_scale")
     return rates, fields
-
-
-class GivenMatter(base.Problem):
-    """A problem whose initial state is handed in."""
-
-    given: Any
-
-    def initial(self, eos):
-        return self.given
-
-
-def scene_of(case, given, end):
-    """The scene of a case, for a given initial state."""
-    problem = GivenMatter(
-        name="given",
-        dimension=case.dimension,
-        n=given.mass.size,
-        domain=case.box.tolist(),
-        boundary=list(case.boundaries),
-        given=given,
-    )
-    laws = dict(case.materials[0])
-    if len(case.materials) > 1:
-        laws = {"materials": {f"m{k}": one for k, one in enumerate(case.materials)}}
-    settings = physics.table("continuum")(
-        formulation="continuum", **laws, kernel=case.kernel, spacing_ratio=case.spacing_ratio,
-        correction=case.order, q_a=1.7, q_b=0.8, balsara=case.balsara,
-        tensile_correction=case.tensile,
-    )  # fmt: skip
-    return Scene(
-        config.Config(
-            problem,
-            settings,
-            config.Time(end=end),
-            config.Output(interval=end),
-            config.Report(),
-            config.Run(),
-        )
-    )
 
 
 def initial_state(case, matter):

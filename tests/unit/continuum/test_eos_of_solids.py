@@ -19,7 +19,17 @@ def test_linear_tait_matches_by_hand():
     density = np.array([990.0, 1000.0, 1010.0])
     np.testing.assert_allclose(rubber.pressure(density, 7.0), [-4000.0, 0.0, 4000.0], rtol=1e-12)
     np.testing.assert_array_equal(rubber.sound_speed(density, density), 20.0)
-    np.testing.assert_array_equal(rubber.internal_energy(density, density), 0.0)
+    np.testing.assert_array_equal(rubber.internal_energy(density, 0.0), 0.0)
+    own = rubber.pressure(density, 0.0)
+    np.testing.assert_array_equal(rubber.internal_energy(density, own), 0.0)
+
+
+def test_tait_refuses_initial_pressure_that_density_does_not_give():
+    rubber = eos.make("tait", rho_0=1000.0, c_0=20.0)
+    with pytest.raises(ConfigError, match=r"pressure 1 at density 1010, but .* gives 4000 there"):
+        rubber.internal_energy(np.array([1000.0, 1010.0]), np.array([0.0, 1.0]))
+    with pytest.raises(ConfigError, match="pressure 5 at density 1000"):
+        rubber.internal_energy(1000.0, 5.0)
 
 
 def test_tait_with_gamma_7_matches_by_hand():
