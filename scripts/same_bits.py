@@ -27,6 +27,7 @@ STEPS = 300
 # Sizes at which every scene takes seconds.
 SMALL = {
     "blob": ["problem.n=2500"],
+    "bodies": ["problem.n=600"],
     "contrast_graded": ["problem.n=2000"],
     "evrard": ["problem.n=1000"],
     "expanding_ball": ["problem.n=1000"],
@@ -41,8 +42,10 @@ SMALL = {
     "point_explosion_2d": ["problem.n=4096"],
     "polytrope": ["problem.n=1000"],
     "rayleigh_taylor": ["problem.n=2048"],
+    "rubber_rings": ["problem.n=1100"],
     "sod_3d": ["problem.n=6000"],
     "sound_wave_2d": ["problem.n=1024"],
+    "taylor_bar": ["problem.n=700"],
     "yee": ["problem.n=1024"],
 }
 

@@ -24,9 +24,12 @@ from sph.errors import ConfigError, DeclarationError, FileError
 from sph.problems.base import Problem, Section
 
 # Keys that exclude each other: if the user gives one, the default of the other is not used.
-_IN_PLACE_OF = {"physics.eos": "gamma", "physics.gamma": "eos"}
-# Keys of one material, for which [physics.materials] has tables of its own.
-_OF_MATERIALS = ("physics.eos", "physics.gamma", "physics.strength")
+_IN_PLACE_OF = {
+    "physics.eos": ("gamma", "materials"),
+    "physics.gamma": ("eos", "materials"),
+    "physics.strength": ("materials",),
+    "physics.materials": ("eos", "gamma", "strength"),
+}
 
 
 class Source(NamedTuple):
@@ -116,7 +119,7 @@ def _set(source: Source, override: str) -> None:
             table[step] = {}
         table = table[step]
     table[path[-1]] = _value(text)
-    if other := _IN_PLACE_OF.get(dotted(path[:2])):
+    for other in _IN_PLACE_OF.get(dotted(path[:2]), ()):
         source.tables[path[0]].pop(other, None)
     for old in [old for old in source.places if old[: len(path)] == path]:
         del source.places[old]
@@ -266,8 +269,7 @@ def _fill_defaults(
         table, name = key.split(".", 1)
         if name not in models[table].model_fields:
             continue
-        has_materials = key in _OF_MATERIALS and "materials" in raw[table]
-        if _IN_PLACE_OF.get(key) not in raw[table] and not has_materials:
+        if not any(other in raw[table] for other in _IN_PLACE_OF.get(key, ())):
             raw[table].setdefault(name, value)
 
 

@@ -39,15 +39,13 @@ class Body(base.Section):
     """One body: its shape and sizes, how particles fill it, its material and its motion."""
 
     shape: Literal["box", "disc", "sphere", "ring", "cylinder", "tube"] = Field(
-        description='"box" (low, high), "disc" (2-D: centre, radius), "ring" (2-D: centre, inner, '
-        'outer), "sphere" (3-D: centre, radius), "cylinder" (3-D: centre, radius, length, axis) or '
-        '"tube" (3-D: centre, inner, outer, length, axis)'
+        description="shape; a disc and a ring are 2-D, a sphere, a cylinder and a tube 3-D"
     )
     low: Point | None = Field(default=None, description="lower corner of a box")
     high: Point | None = Field(default=None, description="upper corner of a box")
     centre: Point | None = Field(
         default=None,
-        description="centre of a round shape; on a mirror, the half inside the domain is placed",
+        description="centre of all other shapes; on a mirror, the half inside the domain is placed",
     )
     radius: Length | None = Field(
         default=None, description="radius of a disc, a sphere or a cylinder"
@@ -60,7 +58,7 @@ class Body(base.Section):
     )
     lattice: Literal["cubic", "hexagonal", "bcc", "fcc"] = Field(
         default="cubic",
-        description='lattice: "cubic", "hexagonal" (2-D), "bcc" or "fcc" (3-D)',
+        description="lattice of the particles; hexagonal in 2-D, bcc and fcc in 3-D",
     )
     spacing: Length | None = Field(
         default=None,

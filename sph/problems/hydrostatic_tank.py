@@ -1,4 +1,4 @@
-"""Water at rest in an open tank: does its pressure stay that of the water above?
+"""Water at rest in an open tank, whose pressure is the weight of the water above.
 
 The water has Tait's equation of state, whose speed of sound is about ten times that of the flow,
 so the density changes by one per cent (Monaghan 1994, J. Comput. Phys. 110, 399). Bottom and sides

@@ -1,4 +1,4 @@
-"""An elastic disc in plane strain that rotates freely: does the scheme keep a rigid rotation?
+"""An elastic disc in plane strain that rotates freely: a test of angular momentum.
 
 The disc starts with the stress and the stretch of its rotation, which are known exactly. It then
 rotates like a rigid body: angular momentum, shape and stress, seen from the disc, stay constant.

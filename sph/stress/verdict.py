@@ -99,12 +99,17 @@ def _verdict(fails: Failing | None, checks: tuple[Check, ...], ended: str) -> tu
     return UNEXPECTED_FAILURE, f"{found}; expected to fail because {fails.because}"
 
 
+def _scheme_key(row: Row) -> str:
+    """The key that names the equations: a formulation need not have several schemes."""
+    return "physics.scheme" if "physics.scheme" in row.settings else "physics.formulation"
+
+
 def _numbers(row: Row | None, figures: Figures) -> dict:
     """The columns that every case has."""
     if row is None:
         return {}
     return {
-        "scheme": row.value("physics.scheme"),
+        "scheme": row.value(_scheme_key(row)),
         "particles": row.n,
         "energy_drift": figures.value("conservation.energy_drift_max"),
         "lowest_internal_energy": figures.value("history.min_internal_energy.min"),

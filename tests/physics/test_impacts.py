@@ -45,21 +45,23 @@ def test_bar_is_shortened_as_by_finite_elements(run, dimension, n, radius_error)
 RINGS = ("problem.n=1100", "physics.allow_tearing=true")
 
 
-@pytest.mark.slow
 def test_rings_bounce_unbroken_with_tensile_correction(run):
     outcome = run("rubber_rings", *RINGS)
     found = figures(outcome)
     assert not torn(outcome)
-    assert 0.5 < found["restitution"] < 0.8  # 0.6 to 0.7 were measured at all resolutions
+    assert 0.6 < found["restitution"] < 0.9  # 0.75 was measured
+    assert found["angular_momentum_change"] < 1e-6  # mirror symmetry, but for round-off that grows
     assert outcome.energy_drift < 5e-4
-    for momentum in outcome.momenta:
-        assert np.abs(momentum).max() < 1e-12 * 2.0  # of the two rings' momenta of 1
+    scale = 0.5 * outcome.particles.mass.sum() * outcome.simulation.scene.config.problem.speed
+    assert np.abs(outcome.momenta[-1]).max() < 1e-12 * scale
 
 
-@pytest.mark.slow
 def test_rings_break_without_tensile_correction(run):
-    outcome = run("rubber_rings", *RINGS, "physics.tensile_correction=0.0", "time.end=1.6e-4")
-    assert torn(outcome)
+    outcome = run("rubber_rings", *RINGS, "physics.tensile_correction=0.0", "time.end=1.3e-4")
+    broken = torn(outcome)
+    # each into pieces of hundreds of particles by t = 1.2e-4, as the other does
+    assert len(broken) == 2
+    assert min(sizes[1] for sizes in broken.values()) > 50
 
 
 # --- several bodies ---------------------------------------------------------------------------

@@ -59,10 +59,13 @@ def test_material_behind_plastic_front_is_at_yield_surface(run):
     # the radial return ends each step, so only round-off is left
     assert deviator.max() <= 4e8 * (1.0 + 1e-12)
     distance = np.abs(particles.position[0])
-    behind = (0.005 < distance) & (distance < 0.02)  # at the plane of impact the stress overshot
+    behind = (distance > 0.005) & (distance < 0.02)  # at the plane of impact the stress overshot
     # oscillations behind the front unload by up to 0.7 % (measured), elastically
     assert deviator[behind].min() > 0.985 * 4e8
-    assert particles.plastic_strain[behind].min() > 0.0
+    # two thirds of the strain, less the elastic part Y/(3 G)
+    plastic = 2.0 / 3.0 * np.log(8050.68 / 7850.0) - 6e8 / (3.0 * 8e10)
+    # 4e-5 was measured
+    assert np.median(particles.plastic_strain[behind]) == pytest.approx(plastic, rel=1e-3)
 
 
 def test_wave_in_free_bar_has_speed_of_theory_at_order_1(run):

@@ -7,6 +7,8 @@ import pytest
 
 from sph import config
 from sph.analysis import truth
+from sph.analysis.figures import profiles
+from sph.analysis.figures.sources import State
 from sph.errors import ConfigError
 from sph.problems.support import uniaxial
 
@@ -194,6 +196,15 @@ def test_wave_in_bar_solves_linear_equations(boundary, mode):
         assert np.abs(at(np.array([0.0, 1.0]), time)["stress"]).max() < 1e-8 * 2e11 * 1e-4
 
 
+def test_energy_of_wave_in_bar_is_constant():
+    what = made("elastic_bar", "problem.boundary=periodic")
+    x = (np.arange(200) + 0.5) / 200
+    for time in (0.0, 2e-5, 7e-5):
+        exact = what.problem.exact(what.physics.eos_model(), time, x[None])
+        energy = exact["internal_energy"] + 0.5 * exact["velocity"][0] ** 2
+        assert energy.mean() == pytest.approx(0.25 * (1e-4 * C_L) ** 2, rel=1e-6)
+
+
 @pytest.mark.parametrize("factor", [1.0, 1.03])
 def test_wave_speed_is_measured_from_history(factor):
     what = made("elastic_bar")
@@ -252,6 +263,27 @@ def test_limit_on_speed_allows_for_lattice_at_order_0(name):
     assert zeroth.allowed()[key].bound > 0.0205  # the error of the gradients in 1-D
     wide = made(name, "physics.correction=0", "physics.spacing_ratio=2.0").problem
     assert wide.allowed() == wide.limits
+
+
+@pytest.mark.parametrize("name", ["elastic_bar", *IMPACTS])
+def test_profiles_and_errors_of_solids_show_stress(name):
+    what = made(name)
+    time = 0.5 * what.time.end
+    position = what.problem.initial(what.physics.eos_model()).position
+    particles, pressure = exactly(what, time, position)
+    particles.deviatoric_stress = particles.deviatoric_stress + 1e7
+    particles.dimension, particles.number = 1, position.shape[1]
+    state = State(SimpleNamespace(particles=particles, config=what, time=time, pressure=pressure))
+    found = state.errors()
+    assert found["stress"] == pytest.approx(1e7, rel=1e-6)
+    assert found["pressure"] < 1.0
+    figure = profiles.single(state)
+    labels = [axes.get_ylabel() for axes in figure.axes]
+    assert labels == [r"$\rho$", "$v$", r"$-\sigma_{xx}$", "$u$"]
+    dots, line = figure.axes[2].lines[:2]
+    exact = what.problem.exact(what.physics.eos_model(), time, position)["stress"]
+    np.testing.assert_allclose(dots.get_ydata(), exact - 1e7, rtol=1e-9, atol=1.0)
+    assert np.nanmax(line.get_ydata()) == pytest.approx(exact.max(), rel=1e-3)
 
 
 def test_stress_of_fluid_is_its_pressure():

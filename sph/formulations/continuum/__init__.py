@@ -6,43 +6,14 @@ import numpy as np
 
 from sph import faults
 from sph.formulations import Formulation
-from sph.formulations.continuum import pieces
-from sph.formulations.continuum.clamps import hold
-from sph.formulations.continuum.gradients import gradients
-from sph.formulations.continuum.material import Material, stresses, yielded
-from sph.formulations.continuum.rates import rates
-from sph.formulations.continuum.rotation import JAUMANN
-from sph.formulations.continuum.support import supports
-from sph.integrators.leapfrog import DENSITY, STRAIGHT
-from sph.part import Evolved, Key, Pass
-from sph.state import COMMON, Field, Public
+from sph.formulations.continuum import fields, pieces, schedule
+from sph.formulations.continuum.material import Material
+from sph.part import Key
 
 STRENGTH = "sph.formulations.continuum.strength"
 
 # Support radius over the smoothing length d of the equations.
 SUPPORT_RATIO = 2.0
-
-DEVIATOR = Field(
-    "deviatoric_stress",
-    rank=2,
-    public=Public("DeviatoricStressTensors", -1, 1, -2, -5, "Deviator of the stress tensor"),
-)
-STRESS = Public("StressTensors", -1, 1, -2, -5, "Stress tensor, positive in tension")
-PLASTIC_STRAIN = Field(
-    "plastic_strain",
-    at_least=0.0,
-    public=Public("PlasticStrains", 0, 0, 0, 0, "Equivalent plastic strain"),
-)
-MATERIAL = Field(
-    "material",
-    at_least=0.0,
-    public=Public("Materials", 0, 0, 0, 0, "Number of the material in the configuration, from 0"),
-)
-CLAMPED = Field(
-    "clamped",
-    at_least=0.0,
-    public=Public("Clamped", 0, 0, 0, 0, "1 for particles that no force moves, otherwise 0"),
-)
 
 
 class ContinuumModels(NamedTuple):
@@ -140,7 +111,7 @@ class Continuum(Formulation):
         self.eos = self.materials[0].eos
         strengths = [one.strength for one in self.materials if one.strength is not None]
         self.is_solid = bool(strengths)
-        self.yields = any(one.yields for one in strengths)
+        self.yields = any(one.yields for one in self.materials)
         self.corrects_tension = self.is_solid and self.tensile_correction > 0.0
         self.models = ContinuumModels(
             kernel=physics.kernel_model(),
@@ -151,9 +122,9 @@ class Continuum(Formulation):
             eta=self.spacing_ratio,
             max_support=scene.max_support,
         )
-        self.fields = self._fields()
-        self.evolved = self._evolved()
-        self.passes = self._passes()
+        self.fields = fields.of(self)
+        self.evolved = fields.evolved(self)
+        self.passes = schedule.of(self)
         self.columns = ("corrections_failed",) if self.order == 1 else ()
         # `check` only names the particle: a NaN is in the sums of the step, always checked
         self.idle = ("check",) if self.order == 1 else ("check", "sums")
@@ -172,108 +143,6 @@ class Continuum(Formulation):
                 text = "expected it in the tables of physics.materials, which are given"
                 found.append((key, text))
         return found
-
-    def _fields(self) -> tuple[Field, ...]:
-        # elastic energy released in tension may exceed the heat
-        found = [
-            field._replace(at_least=None) if field.name == "internal_energy" else field
-            for field in COMMON
-        ]
-        found += [Field("density_rate"), Field("predicted_density", stored=False)]
-        found += [Field("div_v", stored=False), Field("velocity_gradient", rank=2, stored=False)]
-        found += [Field("kernel_factor", stored=False)] * (self.order == 0)
-        found += [Field("kernel_gradient", rank=1, stored=False)] * (self.order >= 0)
-        found += [Field("kernel_matrix", rank=2, stored=False)] * (self.order == 1)
-        found += [Field("balsara", stored=False)] * self.has_balsara
-        found += [MATERIAL] * (len(self.materials) > 1)
-        found += [CLAMPED] * self.is_clamped
-        if not self.is_solid:
-            return (*found, Field("pressure", stored=False))
-        found += [DEVIATOR, Field("stress_rate", rank=2), pieces.BODY]
-        found += [Field("predicted_stress", rank=2, stored=False)]
-        found += [Field("stress", rank=2, stored=False)]
-        found += [PLASTIC_STRAIN] * self.yields
-        if self.corrects_tension:
-            found += [Field("initial_support", remade=True, above=0.0)]
-            found += [Field("tension", rank=2, stored=False)]
-        return tuple(found)
-
-    def _evolved(self) -> tuple[Evolved, ...]:
-        found = (
-            Evolved("internal_energy", "energy_rate", "predicted_energy", STRAIGHT),
-            Evolved("density", "density_rate", "predicted_density", DENSITY),
-        )
-        if not self.is_solid:
-            return found
-        return (
-            *found, Evolved("deviatoric_stress", "stress_rate", "predicted_stress", JAUMANN)
-        )  # fmt: skip
-
-    def _passes(self) -> tuple[Pass, ...]:
-        """Return the passes, with the fields that this scene has."""
-        declared = {field.name for field in self.fields}
-
-        def of(*names):
-            return tuple(name if name in declared else None for name in names)
-
-        matter = ("position", "predicted_velocity", "mass", "predicted_density", "support")
-        corrections = of("kernel_factor", "kernel_gradient", "kernel_matrix")
-        strain = ("velocity_gradient", "div_v")
-        return (
-            Pass(
-                "density",
-                "density",
-                supports,
-                ("support", "mass", "predicted_density"),
-                ("support_before",),
-                swaps=("support", "support_before"),
-                widens=True,
-            ),
-            Pass(
-                "density",
-                "density",
-                gradients,
-                matter,
-                (*corrections, *strain, "density_rate"),
-            ),
-            *[
-                Pass(
-                    "gradients",
-                    "stress",
-                    stresses,
-                    ("predicted_density", "predicted_energy", "support", *strain,
-                     *of("material", "plastic_strain")),
-                    of("pressure", "stress", "sound_speed", "balsara", "stress_rate", "tension"),
-                    of("predicted_stress"),
-                    models=one,
-                )
-                for one in self.materials
-            ],
-            Pass(
-                "rates",
-                "rates",
-                rates,
-                (*matter, *of("sound_speed", "balsara", "pressure", "stress"), *corrections,
-                 *of("tension", "initial_support"), "velocity_gradient"),
-                ("acceleration", "energy_rate", "signal_speed"),
-            ),
-            *[
-                Pass("constraints", "rates", hold, ("clamped",), updates=("acceleration",))
-            ] * self.is_clamped,
-            *[
-                Pass(
-                    "correction",
-                    "stress",
-                    yielded,
-                    ("internal_energy", *strain, *of("material")),
-                    updates=("deviatoric_stress", "plastic_strain"),
-                    models=one,
-                    at_start=False,
-                )
-                for one in self.materials
-                if one.strength is not None and one.strength.yields
-            ],
-        )  # fmt: skip
 
     # --- state ---
 
@@ -340,7 +209,7 @@ class Continuum(Formulation):
     def derived(self, state):
         found = super().derived(state)
         if self.is_solid:
-            found.append((STRESS, self.stress(state)))
+            found.append((fields.STRESS, self.stress(state)))
         return found
 
     # --- words ---

@@ -29,6 +29,10 @@ class Material(NamedTuple):
     strength: Any  # None for a fluid
     tensile_correction: float
 
+    @property
+    def yields(self) -> bool:
+        return self.strength is not None and self.strength.yields
+
 
 @njit(**COMPILED)
 def stresses(

@@ -1,10 +1,9 @@
 """The rate pass: acceleration, du/dt and signal speed (eqs 408-413)."""
 
 import numpy as np
-from numba import njit, types
-from numba.extending import overload
+from numba import njit
 
-from sph.compiled import COMPILED, INLINED, larger, smaller
+from sph.compiled import COMPILED, larger, smaller
 from sph.formulations.continuum.gradients import (
     NEXT,
     VOLUME,
@@ -13,6 +12,14 @@ from sph.formulations.continuum.gradients import (
     copy_volumes,
     of_pair,
     power,
+)
+from sph.formulations.continuum.pair_terms import (
+    component,
+    copy_gradients,
+    corrected_gradient,
+    corrected_gradient_of,
+    traction,
+    traction_of,
 )
 from sph.kernels import dw_over_q, normalisation, w
 from sph.neighbours.order import BLOCK
@@ -126,7 +133,7 @@ def rates(
             to = copy_tensors(lanes, dim, copied, to, stress, block, neighbours, image, per_stress)
             to = copy_values(lanes, copied, to, balsara, block, 0.5)
             to = copy_values(lanes, copied, to, kernel_factor, block, 1.0)
-            to = _copy_gradients(
+            to = copy_gradients(
                 lanes, dim, copied, to, kernel_gradient, block, neighbours, image, still,
                 1.0 / per_length,
             )  # fmt: skip
@@ -161,18 +168,18 @@ def rates(
                     W = w(kernel, dim, q)
                     F_r = times(r_ij, H_inv * H_inv * dw_over_q(kernel, dim, q))
                     # grad W_j(i) and grad W_i(j), eq 402
-                    grad_i = _gradient(
+                    grad_i = corrected_gradient(
                         dim, sym, i, F_r, W, kernel_factor, kernel_gradient, kernel_matrix,
                         per_length,
                     )  # fmt: skip
-                    grad_j = _gradient_of(
+                    grad_j = corrected_gradient_of(
                         lanes, dim, sym, near, k, times(F_r, -1.0), W, kernel_factor,
                         kernel_gradient, kernel_matrix, factor_row, gradient_row, matrix_row,
                     )  # fmt: skip
                     # eq 408
                     pull = minus(
-                        _traction(dim, pressure, stress, i, grad_i, per_stress),
-                        _traction_of(
+                        traction(dim, pressure, stress, i, grad_i, per_stress),
+                        traction_of(
                             lanes, dim, sym, pressure, stress, near, p_row, s_row, k, grad_j
                         ),
                     )
@@ -211,143 +218,10 @@ def rates(
                 work = 0.0  # sigma : L / rho
                 for a in range(D):
                     for b in range(D):
-                        work += _component(pressure, stress, a, b, i) * velocity_gradient[a, b, i]
+                        work += component(pressure, stress, a, b, i) * velocity_gradient[a, b, i]
                 energy_rate[i] = work / density[i] + lane_sum(gained) * (
                     per_length / (per_velocity * per_velocity * per_velocity)
                 )
                 c_i = sound_speed[i]
                 Q = models.q_b * c_i + models.q_a * (lane_max(fastest) / per_velocity)
                 signal_speed[i] = 2.0 * (Q + np.sqrt(Q * Q + c_i * c_i))  # eq 414
-
-
-# --- the corrected gradient of the kernel (eq 402), for particle i and for candidates
-
-
-def _gradient(dim, sym, i, F_r, W, factor, gradient, matrix, per_length):
-    """Return the corrected gradient of particle i."""
-
-
-@overload(_gradient, jit_options=INLINED)  # type: ignore[arg-type]
-def _own_gradient(dim, sym, i, F_r, W, factor, gradient, matrix, per_length):
-    def plain(dim, sym, i, F_r, W, factor, gradient, matrix, per_length):
-        return F_r
-
-    def order_0(dim, sym, i, F_r, W, factor, gradient, matrix, per_length):
-        return plus(times(F_r, factor[i]), times(times(at(dim, gradient, i), 1.0 / per_length), W))
-
-    def order_1(dim, sym, i, F_r, W, factor, gradient, matrix, per_length):
-        return plus(
-            symmetric_times(symmetric_at(dim, matrix, i), F_r),
-            times(times(at(dim, gradient, i), 1.0 / per_length), W),
-        )
-
-    return _by_order(factor, matrix, plain, order_0, order_1)
-
-
-def _gradient_of(
-    lanes, dim, sym, near, k, F_r, W, factor, gradient, matrix, factor_row, gradient_row, matrix_row
-):  # fmt: skip
-    """Return the corrected gradients of candidates."""
-
-
-@overload(_gradient_of, jit_options=INLINED)  # type: ignore[arg-type]
-def _gradients_of_candidates(
-    lanes, dim, sym, near, k, F_r, W, factor, gradient, matrix, factor_row, gradient_row, matrix_row
-):  # fmt: skip
-    def plain(
-        lanes, dim, sym, near, k, F_r, W, factor, gradient, matrix, factor_row, gradient_row,
-        matrix_row,
-    ):  # fmt: skip
-        return F_r
-
-    def order_0(
-        lanes, dim, sym, near, k, F_r, W, factor, gradient, matrix, factor_row, gradient_row,
-        matrix_row,
-    ):  # fmt: skip
-        return plus(
-            times(F_r, load(lanes, near, (factor_row, k))),
-            times(load_spatial(lanes, dim, near, gradient_row, k), W),
-        )
-
-    def order_1(
-        lanes, dim, sym, near, k, F_r, W, factor, gradient, matrix, factor_row, gradient_row,
-        matrix_row,
-    ):  # fmt: skip
-        return plus(
-            symmetric_times(load_spatial(lanes, sym, near, matrix_row, k), F_r),
-            times(load_spatial(lanes, dim, near, gradient_row, k), W),
-        )
-
-    return _by_order(factor, matrix, plain, order_0, order_1)
-
-
-def _by_order(factor, matrix, plain, order_0, order_1):
-    if _is_there(matrix):
-        return order_1
-    return order_0 if _is_there(factor) else plain
-
-
-def _is_there(kind) -> bool:
-    return not isinstance(kind, types.NoneType | types.Omitted)
-
-
-def _copy_gradients(lanes, dim, copied, begin, field, block, neighbours, image, origin, factor):
-    """As `copy_vectors`, nothing for None. Return where the next quantity begins."""
-
-
-@overload(_copy_gradients, jit_options=INLINED)  # type: ignore[arg-type]
-def _copy_vector_gradients(
-    lanes, dim, copied, begin, field, block, neighbours, image, origin, factor
-):
-    def nothing(lanes, dim, copied, begin, field, block, neighbours, image, origin, factor):
-        return begin
-
-    def copy(lanes, dim, copied, begin, field, block, neighbours, image, origin, factor):
-        copy_vectors(lanes, dim, copied, begin, field, block, neighbours, image, origin, factor)
-        return begin + len(dim) * BLOCK
-
-    return copy if _is_there(field) else nothing
-
-
-# --- the stress, or minus the pressure of a fluid
-
-
-def _traction(dim, pressure, stress, i, a, per_stress):
-    """Return sigma_i . a."""
-
-
-@overload(_traction, jit_options=INLINED)  # type: ignore[arg-type]
-def _own_traction(dim, pressure, stress, i, a, per_stress):
-    def of_pressure(dim, pressure, stress, i, a, per_stress):
-        return times(a, -pressure[i] * per_stress)
-
-    def of_stress(dim, pressure, stress, i, a, per_stress):
-        return symmetric_times(times(symmetric_at(dim, stress, i), per_stress), a)
-
-    return of_stress if _is_there(stress) else of_pressure
-
-
-def _traction_of(lanes, dim, sym, pressure, stress, near, p_row, s_row, k, a):
-    """Return sigma_j . a of candidates."""
-
-
-@overload(_traction_of, jit_options=INLINED)  # type: ignore[arg-type]
-def _tractions_of_candidates(lanes, dim, sym, pressure, stress, near, p_row, s_row, k, a):
-    def of_pressure(lanes, dim, sym, pressure, stress, near, p_row, s_row, k, a):
-        return times(a, -load(lanes, near, (p_row, k)))
-
-    def of_stress(lanes, dim, sym, pressure, stress, near, p_row, s_row, k, a):
-        return symmetric_times(load_spatial(lanes, sym, near, s_row, k), a)
-
-    return of_stress if _is_there(stress) else of_pressure
-
-
-def _component(pressure, stress, a, b, i):
-    """Return sigma_ab of particle i."""
-
-
-@overload(_component, jit_options=INLINED)  # type: ignore[arg-type]
-def _stress_component(pressure, stress, a, b, i):
-    if _is_there(stress):
-        return lambda pressure, stress, a, b, i: stress[a, b, i]
-    return lambda pressure, stress, a, b, i: -pressure[i] if a == b else 0.0

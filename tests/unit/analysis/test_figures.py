@@ -10,7 +10,7 @@ from states import gas_state
 from sph import config, kernels, registry
 from sph.analysis import errors, figures
 from sph.analysis.figures import history, maps, profiles, style
-from sph.analysis.figures.sources import State, find_source
+from sph.analysis.figures.sources import State, find_source, von_mises
 from sph.analysis.interpolate import onto_plane
 from sph.errors import ConfigError, FileError
 from sph.output import checkpoint
@@ -18,6 +18,7 @@ from sph.output.history import History
 from sph.output.history import read as read_history
 from sph.output.run_directory import RunDirectory
 from sph.scene import Scene
+from sph.state import State as Particles
 from sph.totals import Baseline, Budget
 
 SMALL = {"shock_tube": 60, "point_explosion": 512, "particles": 4}
@@ -42,7 +43,7 @@ def state_of(problem: str, *overrides: str, time: float | None = None) -> State:
     time = made.time.end if time is None else time
     eos = made.physics.eos_model()
     start = made.problem.initial(eos)
-    particles = gas_state(*start)
+    particles = gas_state(*start[:4])
     volume = np.prod(made.problem.box[:, 1] - made.problem.box[:, 0])
     wave = 1.0 + 0.3 * np.cos(2.0 * np.pi * particles.position[-1])
     particles.density[:] = particles.mass.sum() / volume * wave
@@ -58,6 +59,11 @@ def state_of(problem: str, *overrides: str, time: float | None = None) -> State:
         ratio * made.physics.eta * (particles.mass / particles.density) ** (1 / D)
     )
     particles.declare(Scene(made).fields)  # others that the scene has are zero
+    return drawable(particles, made, time)
+
+
+def drawable(particles: Particles, made, time: float) -> State:
+    """The state of a checkpoint of these particles."""
     lists = {
         "list_position": particles.position.copy(),
         "list_support": particles.support.copy(),
@@ -339,6 +345,69 @@ def test_map_shows_interpolated_fields():
 def test_map_shows_pressure_only_where_it_varies():
     assert maps.second_field(state_of("point_explosion")) == "pressure"
     assert maps.second_field(state_of("kelvin_helmholtz")) == "speed"
+
+
+def solid_state(yields=True) -> State:
+    """A disc of two halves of material 0 and 1 that almost touch, under known stress."""
+    strength = 'name = "elastic_plastic", shear_modulus = 1.0, yield_stress = 1.0'
+    if not yields:
+        strength = 'name = "elastic", shear_modulus = 1.0'
+    made = config.from_text(
+        f"""
+        [problem]
+        name = "bodies"
+        n = 400
+        domain = [-1.5, 1.5]
+        body = [
+          {{ shape = "box", low = [-1.0, -0.5], high = [0.0, 0.5] }},
+          {{ shape = "box", low = [0.0, -0.5], high = [1.0, 0.5] }},
+        ]
+        [physics]
+        strength = {{ {strength} }}
+        """
+    )
+    scene = Scene(made)
+    particles = Particles.at_start(scene.fields, *scene.initial_state())
+    particles.density[:] = 1.0
+    particles.support[:] = 2.4 * np.sqrt(particles.mass)
+    particles.deviatoric_stress[0, 0] = 0.3
+    particles.deviatoric_stress[1, 1] = -0.1
+    return drawable(particles, made, 1.0)
+
+
+@pytest.mark.parametrize(
+    ("yields", "fields"), [(True, ["plastic strain", "von Mises"]), (False, ["von Mises", "press"])]
+)
+def test_map_of_solid_shows_strain_or_stress(yields, fields):
+    panels = maps.single(solid_state(yields)).axes[:2]
+    for panel, field in zip(panels, fields, strict=True):
+        assert panel.get_title().startswith(field)
+
+
+def test_map_of_solid_ends_at_its_surface_and_outlines_bodies():
+    state = solid_state()
+    panel = maps.single(state).axes[1]
+    shown = panel.images[0].get_array()
+    # S_zz = -0.2: the sum of squares is 0.14
+    assert shown.compressed() == pytest.approx(np.full(shown.count(), np.sqrt(0.21)))
+    left, right, bottom, top = panel.images[0].get_extent()
+    area = shown.count() / shown.size * (right - left) * (top - bottom)
+    # of the bodies 2: corners are rounded, and pixels 1/16 wide; 3.1 with all that kernels reach
+    assert area == pytest.approx(2.0, abs=0.15)
+    outlines = [one for one in panel.collections if len(one.get_paths()[0].vertices)]
+    middle = [np.abs(one.get_paths()[0].vertices[:, 0]).min() for one in outlines]
+    assert len(outlines) == 2  # one around each body
+    assert middle == pytest.approx([0.0, 0.0], abs=0.05)
+
+
+@pytest.mark.parametrize(
+    ("stress", "expected"),
+    # uniaxial stress s in 3-D; in 2-D and 1-D the other normal stresses keep S without trace
+    [(np.diag([2.0, -1.0, -1.0]), 3.0), (np.diag([2.0, -1.0]), 3.0), (np.array([[2.0]]), 3.0),
+     (np.array([[0.0, 1.0], [1.0, 0.0]]), np.sqrt(3.0))],
+)  # fmt: skip
+def test_equivalent_stress_has_all_normal_stresses(stress, expected):
+    assert von_mises(stress[:, :, None]) == pytest.approx([expected])
 
 
 def test_maps_over_time_share_colour_scale():
