@@ -2,7 +2,8 @@
 
     python scripts/benchmark.py                      all parts (about 30 CPU minutes)
     python scripts/benchmark.py --quick              the main figures (about 6 CPU minutes)
-    python scripts/benchmark.py engine small         some of: engine, small, whole, start, scenes
+    python scripts/benchmark.py engine small         some of: engine, small, whole, start, scenes,
+                                                     solids
     python scripts/benchmark.py --json FILE          also write the figures to a JSON file
     python scripts/benchmark.py --against CHECKOUT   also another source tree, runs alternating
     python scripts/benchmark.py --check              compare with docs/benchmarks

@@ -27,9 +27,37 @@ end = {end}
 interval = {end}
 """
 TUBE = '[problem]\nname = "shock_tube"\nn = {n}\n[time]\nend = {end}\n[output]\ninterval = {end}\n'
+BLOCKS = """
+[problem]
+name = "bodies"
+dimension = 3
+n = {n}
+domain = [-1.5, 1.5]
+[[problem.body]]
+shape = "box"
+low = [-1.02, -0.5, -0.5]
+high = [-0.02, 0.5, 0.5]
+velocity = [0.05, 0.0, 0.0]
+[[problem.body]]
+shape = "box"
+low = [0.02, -0.5, -0.5]
+high = [1.02, 0.5, 0.5]
+velocity = [-0.05, 0.0, 0.0]
+[physics]
+formulation = "continuum"
+correction = {order}
+tensile_correction = {tensile}
+eos = {{ name = "tait", rho_0 = 1.0, c_0 = 1.0 }}
+strength = {{ name = "elastic", shear_modulus = 0.5 }}
+[time]
+end = {end}
+[output]
+interval = {end}
+"""
 SINGLE = '[run]\nprecision = "single"\n'
 
 STEP = 0.0045 * 64  # of the noisy 3-D lattice times n per axis, by the signal-speed criterion
+BLOCK_STEP = 0.1156  # of the elastic blocks over their spacing, by the signal-speed criterion
 ETA = 1.6  # 125 neighbours in 3-D: 4 pi/3 (1.936 eta)^3, with H/h = 1.936 of Wendland's C2 kernel
 CONSTANT, SWITCHED = "1.0", "{ min = 0.1, max = 2.0 }"
 # Phases of the program's clock that are not part of a step.
@@ -49,6 +77,12 @@ def uniform(
 
 def tube(n=400, end=0.2) -> str:
     return TUBE.format(n=n, end=end)
+
+
+def blocks(n=32**3, steps=20, order=0, tensile=0.0) -> str:
+    """Two elastic cubes that collide, for about `steps` steps; 57 neighbours inside."""
+    end = steps * BLOCK_STEP * (2.0 / n) ** (1 / 3)
+    return BLOCKS.format(n=n, order=order, tensile=tensile, end=end)
 
 
 def of_updates(cost: dict, less: dict | None = None) -> dict[str, float]:
@@ -201,4 +235,30 @@ def _scene_cost(text: str):
     return once
 
 
-PARTS = {"engine": engine, "small": small, "whole": whole, "start": start, "scenes": scenes}
+def solids(quick: bool):
+    """3-D elastic blocks that collide: CPU time per particle update, by phase."""
+    for order, tensile in ((0, 0.0),) if quick else ((0, 0.0), (0, 0.3), (1, 0.0)):
+        for per_axis in (32,) if quick else (32, 64):
+            scene = f"{per_axis}³, order {order}" + ", tensile correction" * (tensile > 0.0)
+            warm = blocks(4096, 3, order, tensile)
+            yield Measurement("solids", scene, _blocks_cost(per_axis**3, order, tensile), warm)
+
+
+def _blocks_cost(n: int, order: int, tensile: float):
+    """The difference of two runs, which leaves out the start and the checkpoint at the end."""
+
+    def once(tree: Tree) -> dict[str, float]:
+        long, short = (run(tree, blocks(n, steps, order, tensile)) for steps in (20, 4))
+        return of_updates(long, short)
+
+    return once
+
+
+PARTS = {
+    "engine": engine,
+    "small": small,
+    "whole": whole,
+    "start": start,
+    "scenes": scenes,
+    "solids": solids,
+}

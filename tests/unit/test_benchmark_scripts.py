@@ -8,6 +8,8 @@ from pathlib import Path
 
 import pytest
 
+from sph import config
+
 SCRIPTS = Path(__file__).parents[2] / "scripts"
 HOME = SCRIPTS.parent
 NAMES = ("benchmark", "benchmark_calibration", "benchmark_results", "benchmark_runs",
@@ -294,3 +296,15 @@ def test_calibration_is_the_work_that_stored_ratios_refer_to(scripts):
     # a sum of 163,840 terms, in any order: round-off of about 1e-13
     assert calibration.arrays[-1].sum() == pytest.approx(CALIBRATION_SUM, rel=1e-11)
     assert "sph" not in (SCRIPTS / "benchmark_calibration.py").read_text().split("import numpy")[1]
+
+
+def test_blocks_are_valid_and_of_the_asked_size(scripts):
+    found = config.from_text(scripts.benchmark_scenes.blocks(4096, 20, 1, 0.3))
+    start = found.problem.initial(found.physics.eos_model())
+    # whole lattices of cubes
+    assert start.mass.size == 2 * 13**3
+    assert found.physics.correction == 1
+    # 20 steps of 0.3 d/(Q + (Q^2 + c^2)^(1/2)) with Q = c and d = 1.2 spacings
+    c, spacing = (1 + 4 / 3 * 0.5) ** 0.5, (2 / 4096) ** (1 / 3)
+    expected = 20 * 0.3 * 1.2 * spacing / (c * (1 + 2**0.5))
+    assert found.time.end == pytest.approx(expected, rel=1e-3)
