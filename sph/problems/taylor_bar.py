@@ -32,6 +32,8 @@ class Problem(base.Problem):
             "name": "mie_gruneisen", "rho_0": 7850.0, "c_0": 3600.0, "slope": 1.8, "gruneisen": 1.81
         },
         "physics.strength": {"name": "elastic_plastic", "shear_modulus": 8e10, "yield_stress": 6e8},
+        # at 1.2 voids open in the foot, where particles move apart to 2.5 spacings
+        "physics.spacing_ratio": 1.5,
         "time.end": 6e-5,
         "output.interval": 6e-6,
     }  # fmt: skip
