@@ -36,6 +36,7 @@ from sph.state import State
 # Of the sum of absolute pair terms, with the condition of order 1's matrix in it. Both sides do the
 # same sums in another order.
 ROUND_OFF = 1e-11
+EPS = np.finfo(np.float32).eps
 CASES = [
     Case((OPEN,), 0, (GAS,)),
     Case((MIRROR,), 1, (ELASTIC,), tensile=0.3),
@@ -303,3 +304,24 @@ def test_rates_two_threads_equal_one_bit_for_bit(case, lists):
     _, two, _ = run_engine(case, random, skin, threads=2)
     for name, values in one.items():
         assert values.tobytes() == two[name].tobytes(), name
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("eager_order")
+@pytest.mark.parametrize("case", [CASES[3], CASES[14]], ids=str)
+def test_single_precision_within_its_round_off(case):
+    random, skin = random_matter(case, "fresh")
+    matter, found, _ = run_engine(case, random, skin, threads=1, lanes=simd.SINGLE)
+    _, expected = expected_of(case, matter)
+    # positions relative to a superblock, in parts of a support, are off by this much of an EPS
+    across = 1.0 + np.ptp(case.box, axis=1).max() / expected["support"][0]
+    worst = 0.0
+    for name, values in found.items():
+        true, scale = expected[name]
+        scale = (abs(true) if scale is None else scale) * across
+        error = np.max(abs(values - true) / (scale + 1e-300))
+        # in EPS of single precision: sums of some hundred terms; 10 is seen
+        assert error < 30 * EPS, name
+        worst = max(worst, error)
+    # single precision it is
+    assert worst > 0.01 * EPS
