@@ -31,8 +31,8 @@ class Problem(base.Problem):
         "physics.formulation": "continuum",
         "physics.eos": {"name": "tait", "rho_0": DENSITY, "c_0": math.sqrt(BULK / DENSITY)},
         "physics.strength": {"name": "elastic", "shear_modulus": SHEAR},
-        "physics.correction": 1,
-        "time.end": 0.5,
+        "physics.balsara": False,  # viscosity must damp the zero-energy modes of a bent lattice
+        "time.end": 0.4,
         "output.interval": 0.065,
     }
     limits: ClassVar = {
@@ -62,7 +62,7 @@ class Problem(base.Problem):
         description="length in the jaws, which hold the plate above, below and at its end",
     )
     tip_velocity: float = Field(
-        default=0.25,
+        default=0.1,
         description="velocity of the free end along y at t = 0, in the shape of the first mode of "
         "a thin plate",
     )

@@ -4,9 +4,8 @@ from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
-from sph import faults
 from sph.formulations import Formulation
-from sph.formulations.continuum import fields, pieces, schedule
+from sph.formulations.continuum import fields, pieces, schedule, soundness
 from sph.formulations.continuum.material import Material
 from sph.part import Key
 
@@ -245,24 +244,7 @@ class Continuum(Formulation):
         return inside, outside
 
     def check(self, simulation):
-        """Raise NumericalError if the stress or the sound speed of a particle is not a number."""
-        p = simulation.particles
-        tests = [("sound speed", p.sound_speed, p.sound_speed)]
-        if self.is_solid:
-            deviator = p.deviatoric_stress
-            tests.append(("stress", deviator.sum(axis=(0, 1)), deviator.sum(axis=(0, 1))))
-        for name, values, _ in tests:
-            if np.isfinite(values).all():
-                continue
-            i = int(np.flatnonzero(~np.isfinite(values))[0])
-            raise faults.fault(
-                simulation,
-                f"{name} of particle {p.id[i]} is {values[i]}: density {p.density[i]:.6g}, "
-                f"internal energy {p.internal_energy[i]:.6g}",
-                "smaller steps (physics.C), more viscosity (physics.q_a, physics.q_b), or an "
-                "equation of state that holds at this density",
-                int(p.id[i]),
-            )
+        soundness.check(simulation, self.materials)
 
     def check_output(self, simulation):
         """Raise NumericalError if a solid body has torn."""

@@ -35,8 +35,8 @@ def state(velocity=((3.0, 5.0), (0.0, 0.0)), mass=(1.0, 1.0)):
 
 
 def kept(particles=None, keeps=(1.0, 1.0), **columns):
-    formulation = SimpleNamespace(pressure=lambda state: np.full(state.mass.size, 4.0))
-    scene = SimpleNamespace(eos=EOS, keeps_momentum=np.array(keeps), formulation=formulation)
+    formulation = SimpleNamespace(sound_speed=lambda state: EOS.sound_speed(state.density, 4.0))
+    scene = SimpleNamespace(keeps_momentum=np.array(keeps), formulation=formulation)
     return conservation(history(**columns), particles or state(), scene, Baseline(1.0, 8.0))
 
 

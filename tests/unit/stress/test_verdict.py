@@ -233,6 +233,8 @@ def test_case_columns_are_worst_of_run(ended, tmp_path):
         "cpu_seconds": 5.0,
     }
     assert verdicts._numbers(None, ended) == {}
+    without = Row(tmp_path, "a", {"physics.formulation": "continuum"}, ended.summary, "done")
+    assert verdicts._numbers(without, ended)["scheme"] == "continuum"
 
 
 def test_run_without_summary_judged_by_its_failure(tmp_path, monkeypatch):
