@@ -104,6 +104,13 @@ lattice = "relaxed"
 end = 0.05
 """,
 }
+strength = { name = "elastic", shear_modulus = 0.2 }
+[time]
+end = 0.8
+[output]
+interval = 0.4
+""",
+}
 
 
 def sph(*arguments):
@@ -197,6 +204,7 @@ class FakeSimulation:
         self.max_support, self.number = 0.125, 40
         self.scene = self.config = self.problem = self.particles = self.run = self
         self.precision = precision
+        self.formulation, self.neighbours_key = self, "physics.eta"
         self.inexact_momentum = inexact
         self.swamped = swamped or {}
         self.allowed = lambda: limits or {}
