@@ -104,13 +104,6 @@ lattice = "relaxed"
 end = 0.05
 """,
 }
-strength = { name = "elastic", shear_modulus = 0.2 }
-[time]
-end = 0.8
-[output]
-interval = 0.4
-""",
-}
 
 
 def sph(*arguments):
