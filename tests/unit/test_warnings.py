@@ -197,6 +197,7 @@ class FakeSimulation:
         self.max_support, self.number = 0.125, 40
         self.scene = self.config = self.problem = self.particles = self.run = self
         self.precision = precision
+        self.formulation, self.neighbours_key = self, "physics.eta"
         self.inexact_momentum = inexact
         self.swamped = swamped or {}
         self.allowed = lambda: limits or {}
