@@ -6,8 +6,8 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from sph.analysis.figures import style
+from sph.columns import shared as shared_columns
 from sph.integrators.step_size import CRITERIA
-from sph.output.history import columns as shared_columns
 
 ENERGIES = (
     ("total_energy", "total", "black", "-"),
