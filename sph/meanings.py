@@ -1,4 +1,4 @@
-"""Meaning and unit of every column of history.csv and of every entry of summary.json, by name.
+"""Meaning and unit of columns of history.csv and entries of summary.json, by name.
 
 The declarations stand in `sph.columns`, `sph.summary`, and with the parts and problems that compute
 the numbers. docs/output.md is written from them.
