@@ -17,16 +17,18 @@ from sph.analysis.export import fields, vtk
 
 
 def opened(path: Path, step: int):
-    """The grid of a time step, as pyvista sees it, and its time."""
+    """The grid of a time step, as pyvista sees it, and its time; None if the file has one step."""
     import pyvista
+    from vtkmodules.vtkCommonExecutionModel import vtkStreamingDemandDrivenPipeline
     from vtkmodules.vtkIOHDF import vtkHDFReader
 
     reader = vtkHDFReader()
     reader.SetFileName(str(path))
     reader.UpdateInformation()
+    times = reader.GetOutputInformation(0).Get(vtkStreamingDemandDrivenPipeline.TIME_STEPS())
     reader.SetStep(step)
     reader.Update()
-    return pyvista.wrap(reader.GetOutput()), reader.GetTimeValue()
+    return pyvista.wrap(reader.GetOutput()), times[step] if times else None
 
 
 def faults(states, path: Path) -> list[str]:
@@ -36,7 +38,11 @@ def faults(states, path: Path) -> list[str]:
     for step, state in enumerate(states):
         grid, time = opened(path, step)
         D = state.particles.dimension
-        seen = {"time": time, "position": grid.points[:, :D], "cells": grid.n_cells}
+        seen = {
+            "time": state.time if time is None else time,
+            "position": grid.points[:, :D],
+            "cells": grid.n_cells,
+        }
         expected = {
             "time": state.time, "position": fields.position(state), "cells": grid.n_points
         }  # fmt: skip

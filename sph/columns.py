@@ -19,7 +19,7 @@ OF_ALL: Mapping[str, Quantity] = {
         units.TIME,
     ),
     "limiter_particle": Quantity("ID of the particle that limits dt, 0 if no particle does"),
-    "limiter": Quantity("criterion that limits dt, see below"),
+    "limiter": Quantity("criterion that limits dt"),
     "kinetic_energy": Quantity("kinetic energy of all particles", units.ENERGY),
     "kinetic_energy_without_bulk": Quantity(
         "kinetic energy relative to the mean velocity, along axes that conserve momentum",

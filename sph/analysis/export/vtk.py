@@ -1,4 +1,4 @@
-"""VTKHDF files, which ParaView and pyvista open: particles as points, checkpoints as time steps.
+"""VTKHDF files for ParaView and pyvista: particles as points, checkpoints as time steps.
 
 The layout is that of "VTKHDF file format", version 2, type UnstructuredGrid, in the documentation
 of VTK. Each particle is a cell (a vertex). Each time step is one part, appended to all datasets.

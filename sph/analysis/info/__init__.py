@@ -1,4 +1,4 @@
-"""What a run or a checkpoint holds: state, settings, steps, cost and figures with their meaning."""
+"""What a run or checkpoint holds: state, settings, steps, cost, figures with their meaning."""
 
 from pathlib import Path
 from typing import Any

@@ -15,10 +15,15 @@ from sph.output.run_directory import RunDirectory
 from sph.summary import Summary
 
 
+def is_run(path: Path) -> bool:
+    """Whether `path` is a run directory."""
+    return (path / "checkpoints").is_dir()
+
+
 def opened_run(path: Path) -> RunDirectory:
     """Return the run directory at `path`. Raises FileError, which names runs inside `path`."""
     inside = sorted(one.parent.name for one in path.glob("*/config.toml"))
-    if inside and not (path / "checkpoints").is_dir():
+    if inside and not is_run(path):
         raise FileError(
             f"{path} is not a run directory, but contains {len(inside)} run(s).\n"
             f"Try: {path / inside[0]}; or `sph report {path}`, which compares them."

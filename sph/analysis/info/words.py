@@ -63,20 +63,19 @@ def _checkpoint_state(state: dict[str, Any]) -> list[str]:
 def _settings(settings: Sequence[dict[str, Any]]) -> list[str]:
     if not settings:
         return ["Settings: the defaults of the problem"]
-    rows = [
-        (
-            one["key"],
-            f"= {_short(one['value'])}",
-            "" if one["default"] is None else f"default {_short(one['default'])}",
-        )
-        for one in settings
-    ]
-    return ["Settings that differ from the defaults:", *_aligned(rows)]
+    lines, rows = ["Settings that differ from the defaults:"], []
+    for one in settings:
+        value, default = setting_text(one["value"]), setting_text(one["default"])
+        if max(len(value), len(default)) > LONGEST_VALUE:
+            rows += [(one["key"], f"= {value}"), ("", f"default {default}")]
+        else:
+            rows.append((one["key"], f"= {value}  (default {default})"))
+    return lines + _aligned(rows)
 
 
-def _short(value: Any) -> str:
-    text = "not given" if value is None else value_text(value)
-    return text if len(text) <= LONGEST_VALUE else f"{text[: LONGEST_VALUE - 1]}…"
+def setting_text(value: Any) -> str:
+    """Return the value of a key as TOML, or "none"."""
+    return "none" if value is None else value_text(value)
 
 
 def _steps(steps: dict[str, Any]) -> list[str]:
@@ -142,10 +141,11 @@ def _figure(one: dict[str, Any]) -> list[str]:
     unit = f" {one['unit']}" if one["unit"] else ""
     name = one["name"].partition(".")[2]
     meaning = one["meaning"] or "no meaning is declared: see the file of the problem"
-    return [f"  {name} = {_number(one['value'])}{unit}", _wrapped(meaning, "      ")]
+    return [f"  {name} = {number(one['value'])}{unit}", _wrapped(meaning, "      ")]
 
 
-def _number(value: float | None) -> str:
+def number(value: float | None) -> str:
+    """Return a number with six digits, or "none"."""
     if value is None:
         return "none"
     return str(value) if isinstance(value, int) else f"{value:.6g}"

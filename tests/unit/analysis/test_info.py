@@ -128,7 +128,7 @@ def test_text_holds_all_that_was_found(ended):
         if not one["name"].startswith(("errors.", "particles", "time", "dimension", "steps")):
             assert one["name"].partition(".")[2] in text, one["name"]
     for words in (
-        "State: done at t = 0.2 of 0.2, step 2, by sph 0.9", "Warning (volume)", "default 0.15",
+        "State: done at t = 0.2 of 0.2, step 2, by sph 0.9", "Warning (volume)", "(default 0.15)",
         "50.0 %  viscosity", "12.5 %", "peak_density = 1.25 mass length^-D", "= none",
         "no meaning is declared", "heating: not given",
     ):  # fmt: skip
