@@ -13,7 +13,7 @@ from sph import columns, faults, parts, registry
 from sph.config.physics import DEFAULT, FORMULATIONS
 from sph.integrators.step_size import CRITERIA
 from sph.part import Part
-from sph.quantity import Quantity, meaning
+from sph.quantity import Quantity, exponents, meaning
 from sph.summary import Summary
 
 
@@ -35,6 +35,14 @@ def of_part_columns(formulation: str) -> Mapping[str, Quantity]:
 
 def _kinds(formulation: str) -> tuple[type[Part], ...]:
     return (registry.part_class(FORMULATIONS, formulation), *parts.classes(formulation))
+
+
+def unit_of(config, quantity: Quantity | None) -> str | None:
+    """Return the unit of a quantity, in the physical units of a run that has some."""
+    if quantity is None:
+        return None
+    powers = exponents(quantity.unit) if config.units.are_given else None
+    return quantity.unit if powers is None else config.units.symbol(*powers)
 
 
 def of_entry(problem, name: str) -> Quantity | None:

@@ -32,6 +32,23 @@ class Quantity(NamedTuple):
     unit: str = ""
 
 
+def exponents(unit: str) -> tuple[int, int, int] | None:
+    """Return the exponents of length, mass and time in a unit; None for other units.
+
+    D counts as 3: with physical units ([units]), a run in 1-D or 2-D is a layer that is one unit of
+    length deep along unused axes.
+    """
+    found = {"length": 0, "mass": 0, "time": 0}
+    for factor in unit.split():
+        name, _, power = factor.partition("^")
+        if name not in found:
+            return None
+        terms = power.strip("()").replace("D", "3") or "1"  # such as -3 and 2-3
+        first, minus, rest = terms.rpartition("-")
+        found[name] = int(first or 0) - int(rest) if minus else int(rest)
+    return found["length"], found["mass"], found["time"]
+
+
 def compared(
     quantities: Mapping[str, Quantity], to: str = "exact", error: str = "relative error, absolute"
 ) -> dict[str, Quantity]:

@@ -131,6 +131,22 @@ def test_every_criterion_has_words():
     assert meanings.of_criterion("gas", "nothing") is None
 
 
+@pytest.mark.parametrize(
+    ("unit", "powers"),
+    [
+        ("", (0, 0, 0)),
+        (quantity.DENSITY, (-3, 1, 0)),
+        (quantity.PRESSURE, (-1, 1, -2)),
+        (quantity.SPECIFIC_ENERGY, (2, 0, -2)),
+        ("mass length^(3-D) time^-2", (0, 1, -2)),
+        (quantity.CPU_SECONDS, None),
+        ("unit of the field", None),
+    ],
+)
+def test_exponents_of_units_are_those_of_a_layer_one_unit_deep(unit, powers):
+    assert quantity.exponents(unit) == powers
+
+
 def test_compared_declares_expected_value_and_error():
     found = quantity.compared({"a": Quantity("a figure", "time")}, "reference")
     assert [*found] == ["a", "a_reference", "a_error"]

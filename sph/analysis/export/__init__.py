@@ -21,7 +21,8 @@ def write(
     """Write the particles of a run or checkpoint in each of `formats`; yield the files.
 
     Of a run, the last checkpoint, or those nearest to `times`, or `every` one. CSV has one file for
-    each checkpoint, VTKHDF one file with all of them as time steps. Files go to `directory`, by
+    each checkpoint, besides times.csv and columns.csv, which has units and meanings; VTKHDF one
+    file with all of them as time steps. Files go to `directory`, by
     default export/ in the run directory, or beside a checkpoint that is in no run; they replace
     earlier ones. Raises ConfigError for contradictory choices, FileError for what is missing,
     damaged or cannot be written.
@@ -35,13 +36,22 @@ def write(
     with explained(f"cannot write to {target}"):
         target.mkdir(parents=True, exist_ok=True)
     if "csv" in formats:
-        for path in chosen:
-            yield from tables.write(checkpoints.read(path), target, _suffix(path))
+        yield from _write_tables(chosen, target)
     if "vtk" in formats:
         suffix = _suffix(chosen[0]) if len(chosen) == 1 else ""
         yield vtk.write(
             (checkpoints.read(path) for path in chosen), target / f"particles{suffix}.vtkhdf"
         )
+
+
+def _write_tables(chosen: Sequence[Path], target: Path) -> Iterator[Path]:
+    times = {}
+    for path in chosen:
+        state = checkpoints.read(path)
+        times[_suffix(path)[1:]] = state.time
+        yield from tables.write(state, target, _suffix(path))
+    yield tables.write_times(times, target)
+    yield tables.write_columns(state, target)
 
 
 def _suffix(path: Path) -> str:

@@ -48,5 +48,14 @@ def of(checkpoint: Checkpoint) -> Iterator[Exported]:
         yield Exported(name, np.moveaxis(array, -1, 0)[order], public)
 
 
+def unit_of(config, public: Public) -> str:
+    """Return the unit of a field: in code units, or in the physical units of the run."""
+    powers = (public.length, public.mass, public.time)
+    if config.units.are_given:
+        return config.units.symbol(*powers)
+    named = (("mass", powers[1]), ("length", powers[0]), ("time", powers[2]))
+    return " ".join(name + (f"^{power}" if power != 1 else "") for name, power in named if power)
+
+
 def _order(checkpoint: Checkpoint) -> np.ndarray:
     return np.argsort(checkpoint.particles.id)

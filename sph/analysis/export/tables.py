@@ -12,9 +12,22 @@ from sph.analysis.export import fields
 from sph.output.checkpoint import Checkpoint
 from sph.output.files import replacing
 from sph.problems.support import uniaxial
+from sph.state import Public
 
 AXES = "xyz"
 TENSOR = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
+PLACE = Public("", 1, 0, 0, 0, "Position")
+# Columns of profiles.
+PROFILE = {
+    "x": PLACE,
+    "r": Public("", 1, 0, 0, 0, "Distance from the centre of the problem"),
+    "density": Public("", -3, 1, 0, 0, "Density"),
+    "velocity": Public("", 1, 0, -1, 0, "Velocity along the coordinate of the profile"),
+    "velocity_phi": Public("", 1, 0, -1, 0, "Velocity across the radius"),
+    "pressure": Public("", -1, 1, -2, 0, "Pressure"),
+    "internal_energy": Public("", 2, 0, -2, 0, "Internal energy per unit mass"),
+    "stress": Public("", -1, 1, -2, 0, "Compressive stress -sigma_xx"),
+}
 BLOCK = 100_000  # rows that are made into text at once
 
 
@@ -40,20 +53,52 @@ def particles(checkpoint: Checkpoint) -> dict[str, np.ndarray]:
     id, x, y, z, vx, vy, vz (as many as there are dimensions), mass, density, internal_energy, h,
     further fields of the scene, and pressure. Components of vectors are NAME_x, of tensors NAME_xx.
     """
+    return {name: values for name, values, _ in _columns(checkpoint)}
+
+
+def _columns(checkpoint: Checkpoint) -> Iterator[tuple[str, np.ndarray, Public]]:
+    """Yield name, values and declaration of each column of the particles."""
+    found = {one.name: one for one in fields.of(checkpoint)}
+    yield "id", found["id"].values, found.pop("id").public
     place = fields.position(checkpoint)
-    D = place.shape[1]
-    columns = {axis: place[:, d] for d, axis in enumerate(AXES[:D])}
-    for one in fields.of(checkpoint):
+    for d in range(place.shape[1]):
+        yield AXES[d], place[:, d], PLACE
+    for one in found.values():
         if one.values.ndim == 1:
-            columns[one.name] = one.values
+            yield one.name, one.values, one.public
         elif one.values.ndim == 2:
             stem = "v" if one.name == "velocity" else f"{one.name}_"
-            columns |= {f"{stem}{AXES[d]}": one.values[:, d] for d in range(one.values.shape[1])}
+            for d in range(one.values.shape[1]):
+                yield f"{stem}{AXES[d]}", one.values[:, d], one.public
         else:
             for i, j in TENSOR:
                 if max(i, j) < one.values.shape[1]:
-                    columns[f"{one.name}_{AXES[i]}{AXES[j]}"] = one.values[:, i, j]
-    return {"id": columns.pop("id"), **columns}
+                    yield f"{one.name}_{AXES[i]}{AXES[j]}", one.values[:, i, j], one.public
+
+
+def write_columns(checkpoint: Checkpoint, directory: Path) -> Path:
+    """Write columns.csv: unit and meaning of each column of particles and profile."""
+    rows = [(name, public) for name, _, public in _columns(checkpoint)]
+    if _has_profile(checkpoint):
+        known = dict(rows)
+        for name in profile(checkpoint):
+            rows += [(name, PROFILE[name.removesuffix("_exact")])] * (name not in known)
+    units = [fields.unit_of(checkpoint.config, public) for _, public in rows]
+    exact = [", exact solution" * name.endswith("_exact") for name, _ in rows]
+    meaning = [f"{one.description}{more}" for (_, one), more in zip(rows, exact, strict=True)]
+    return _write(
+        directory / "columns.csv",
+        {"column": np.array([name for name, _ in rows]), "unit": np.array(units),
+         "meaning": np.array(meaning)},
+    )  # fmt: skip
+
+
+def write_times(times: Mapping[str, float], directory: Path) -> Path:
+    """Write times.csv: the time of each exported checkpoint, by the number in the files' names."""
+    return _write(
+        directory / "times.csv",
+        {"number": np.array(list(times)), "time": np.array(list(times.values()))},
+    )
 
 
 def profile(checkpoint: Checkpoint) -> dict[str, np.ndarray]:

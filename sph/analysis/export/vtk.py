@@ -59,6 +59,7 @@ def _append_step(root: h5py.Group, steps: h5py.Group, checkpoint: Checkpoint, nu
     for one in fields.of(checkpoint):
         dataset = _append(data, one.name, _in_three_dimensions(one.values))
         dataset.attrs["Description"] = one.public.description
+        dataset.attrs["Unit"] = fields.unit_of(checkpoint.config, one.public)
         _append(offsets, one.name, np.array([before]))
 
 

@@ -58,7 +58,8 @@ def _head(found: dict[str, Any]) -> str:
     state = found["state"]
     size = "" if state["particles"] is None else f", {state['particles']} particles"
     words = (
-        f"{state['dimension']}-D{size}, t = {number(state['time'])} of {number(state['end'])}, "
+        f"{state['dimension']}-D{size}, t = {number(state['time'])} of {number(state['end'])}"
+        f"{' ' * bool(state['time_unit'])}{state['time_unit']}, "
         f"step {state['step']}"
     )
     status = escaped(state["status"])

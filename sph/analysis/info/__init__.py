@@ -45,6 +45,7 @@ def _of_run(run: RunDirectory) -> Found:
         "lineage": lineage,
         "settings_changed": restarts.settings_changed(lineage),
         "settings": settings.different(config),
+        "units": config.units.model_dump() if config.units.are_given else None,
         "steps": _steps(config, rows) if rows["step"].size > 1 else None,
         "time": _time(summary) if summary else None,
         "errors": summary["errors"] if summary else None,
@@ -72,6 +73,7 @@ def _of_checkpoint(path: Path, state: Checkpoint) -> Found:
         "lineage": list(state.lineage),
         "settings_changed": restarts.settings_changed(state.lineage),
         "settings": settings.different(config),
+        "units": config.units.model_dump() if config.units.are_given else None,
         "errors": found,
         "errors_left_out": why,
         "figures": _figures(config, {"errors": found or {}, "report": report or {}}),
@@ -126,7 +128,7 @@ def _figures(config: Config, summary) -> list[Found]:
             {
                 "name": name,
                 "value": value,
-                "unit": known.unit if known else None,
+                "unit": meanings.unit_of(config, known),
                 "meaning": known.help if known else None,
             }
         )
@@ -153,7 +155,7 @@ def _columns(config: Config, rows: dict[str, np.ndarray]) -> list[Found]:
             {
                 "name": name,
                 "last": last if isinstance(last, str) else float(last),
-                "unit": known.unit if known else None,
+                "unit": meanings.unit_of(config, known),
                 "meaning": known.help if known else None,
             }
         )

@@ -65,6 +65,7 @@ def of(
         "particles": last.particles.number if last else None,
         "time": float(rows["t"][-1]) if has_rows else (last.time if last else 0.0),
         "end": config.time.end,
+        "time_unit": config.units.symbol(0, 0, 1),
         "step": int(rows["step"][-1]) if has_rows else (last.step if last else 0),
         "checkpoints": len(run.checkpoints()),
         "last_checkpoint": _shown(run, last),
@@ -80,6 +81,7 @@ def of_checkpoint(state: Checkpoint) -> dict[str, Any]:
         "particles": state.particles.number,
         "time": state.time,
         "end": state.config.time.end,
+        "time_unit": state.config.units.symbol(0, 0, 1),
         "step": state.step,
         "next_step": state.next_step,
     }

@@ -1,11 +1,12 @@
 """The settings of a run that differ from the defaults."""
 
+import dataclasses
 from typing import Any
 
 from sph import config as configuration
 from sph.config import Config, restarts
 from sph.config.toml_text import value_text
-from sph.errors import ConfigError
+from sph.errors import SphError
 
 
 def different(config: Config) -> list[dict[str, Any]]:
@@ -14,6 +15,7 @@ def different(config: Config) -> list[dict[str, Any]]:
     Defaults are those of the problem and of the formulation. A key without a default, and all keys
     if the defaults cannot be found, count as different.
     """
+    bare = dataclasses.replace(config)  # without cached properties
     problem, formulation = config.problem, config.physics.formulation
     given = problem.model_dump(exclude_none=True)
     needed = {
@@ -24,10 +26,10 @@ def different(config: Config) -> list[dict[str, Any]]:
     text = "[problem]\n" + "".join(f"{name} = {value_text(one)}\n" for name, one in needed.items())
     try:
         plain = configuration.from_text(f'{text}[physics]\nformulation = "{formulation}"\n')
-    except ConfigError:  # of a problem whose keys depend on each other
+    except SphError:  # of a problem whose keys depend on each other, or on a file
         return [_setting(key, value, None) for key, value in _all(config)]
     found = [_setting(f"problem.{key}", one, None) for key, one in needed.items() if key != "name"]
-    return found + [_setting(one.key, one.now, one.was) for one in restarts.changes(plain, config)]
+    return found + [_setting(one.key, one.now, one.was) for one in restarts.changes(plain, bare)]
 
 
 def _setting(key: str, value: Any, default: Any) -> dict[str, Any]:

@@ -37,10 +37,7 @@ def in_words(found: dict[str, Any]) -> str:
 
 def _run_state(state: dict[str, Any]) -> list[str]:
     version = f", by sph {state['version']}" if state["version"] else ""
-    lines = [
-        f"State: {state['status']} at t = {state['time']:.6g} of {state['end']:g}, step "
-        f"{state['step']}{version}"
-    ]
+    lines = [f"State: {state['status']} at t = {_times(state)}, step {state['step']}{version}"]
     if state["reason"]:
         lines.append(_wrapped(f"Reason: {state['reason']}"))
     if last := state["last_checkpoint"]:
@@ -53,9 +50,13 @@ def _run_state(state: dict[str, Any]) -> list[str]:
     return lines
 
 
+def _times(state: dict[str, Any]) -> str:
+    return f"{state['time']:.6g} of {state['end']:g} {state['time_unit']}".rstrip()
+
+
 def _checkpoint_state(state: dict[str, Any]) -> list[str]:
     return [
-        f"State: t = {state['time']:.6g} of {state['end']:g}, step {state['step']}; next step "
+        f"State: t = {_times(state)}, step {state['step']}; next step "
         f"{state['next_step']:.4g} or less"
     ]
 

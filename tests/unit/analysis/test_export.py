@@ -97,8 +97,9 @@ def test_positions_are_those_of_the_run_inside_its_periodic_box(shear):
 
 def test_problem_without_profile_has_particles_only(shear):
     done = invoked(shear.path, "--csv")
-    assert [path.name for path in (shear.path / "export").iterdir()] == ["particles_000001.csv"]
-    assert done.stdout.count("wrote") == 1
+    names = {path.name for path in (shear.path / "export").iterdir()}
+    assert names == {"particles_000001.csv", "times.csv", "columns.csv"}
+    assert done.stdout.count("wrote") == 3
 
 
 def test_profile_holds_exact_solution_at_particles(tube):
@@ -123,6 +124,42 @@ def test_profile_of_round_problem_is_over_the_radius():
     # velocity is the radial component; the exact one has no other
     assert np.abs(found["velocity_phi"]).max() < 1e-12
     assert found["velocity"].max() > 0.1
+
+
+def text_table(path):
+    with open(path, newline="") as file:
+        return [*csv.reader(file)]
+
+
+def test_columns_and_times_of_tables_are_written(tube):
+    invoked(tube.path, "--csv", "--all")
+    header, *times = text_table(tube.path / "export" / "times.csv")
+    assert header == ["number", "time"]
+    assert times == [["000000", "0.0"], ["000001", "0.1"], ["000002", "0.2"]]
+    header, *rows = text_table(tube.path / "export" / "columns.csv")
+    assert header == ["column", "unit", "meaning"]
+    described = {name: (unit, meaning) for name, unit, meaning in rows}
+    assert len(described) == len(rows)
+    for table in ("particles", "profile"):
+        names = text_table(tube.path / "export" / f"{table}_000002.csv")[0]
+        assert {*names} <= {*described}, table
+    assert described["density"] == ("mass length^-3", "Density, per D-dimensional volume")
+    assert described["velocity_exact"][1].endswith(", exact solution")
+
+
+def test_exports_have_physical_units(tmp_path):
+    units = ("units.length=pc", "units.mass=M_sun", "units.time=Myr")
+    state = state_of("shock_tube", *units)
+    run = write_run(tmp_path / "tube", [state])
+    assert invoked(run.path, "--csv", "--vtk").exit_code == 0
+    rows = text_table(run.path / "export" / "columns.csv")
+    assert {row[0]: row[1] for row in rows}["density"] == "M_sun pc^-3"
+    with h5py.File(run.path / "export" / "particles_000000.vtkhdf") as file:
+        assert file["VTKHDF/PointData/internal_energy"].attrs["Unit"] == "pc^2 Myr^-2"
+    # the numbers are those of the run
+    found = read(run.path / "export" / "particles_000000.csv")
+    particles = state.checkpoint.particles
+    assert np.array_equal(found["mass"], particles.mass[np.argsort(particles.id)])
 
 
 def test_vtk_file_has_structure_of_its_specification(shear):

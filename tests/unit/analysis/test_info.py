@@ -114,6 +114,20 @@ def test_every_number_of_the_summary_has_its_meaning(ended):
     assert without == ["report.of_a_user"]
 
 
+def test_figures_have_physical_units(tmp_path):
+    units = ("units.length=pc", "units.mass=M_sun", "units.time=Myr")
+    run = write_run(tmp_path / "tube", [state_of("shock_tube", *units, time=t) for t in (0.0, 0.2)])
+    run.write_summary(ENDED)
+    found = info.of(run.path)
+    figures = {one["name"]: one["unit"] for one in found["figures"]}
+    assert figures["report.peak_density"] == "M_sun pc^-3"
+    assert figures["cost.wall_seconds"] == "s"
+    columns = {one["name"]: one["unit"] for one in found["columns"]}
+    assert columns["total_energy"] == "M_sun pc^2 Myr^-2"
+    assert "t = 0.2 of 0.2 Myr, step" in in_words(found)
+    assert found["units"]["length"] == "pc"
+
+
 def test_every_column_of_the_history_has_its_meaning(ended):
     columns = {one["name"]: one for one in info.of(ended.path)["columns"]}
     assert columns["limiter"]["last"] == "end"
