@@ -37,10 +37,8 @@ def _kinds(formulation: str) -> tuple[type[Part], ...]:
     return (registry.part_class(FORMULATIONS, formulation), *parts.classes(formulation))
 
 
-def unit_of(config, quantity: Quantity | None) -> str | None:
+def unit_of(config, quantity: Quantity) -> str:
     """Return the unit of a quantity, in the physical units of a run that has some."""
-    if quantity is None:
-        return None
     powers = exponents(quantity.unit) if config.units.are_given else None
     return quantity.unit if powers is None else config.units.symbol(*powers)
 

@@ -32,6 +32,22 @@ class Quantity(NamedTuple):
     unit: str = ""
 
 
+# Fields of particles in figures and profiles.
+FIELDS = {
+    "x": Quantity("position along x", LENGTH),
+    "r": Quantity("distance from the centre of the problem", LENGTH),
+    "density": Quantity("density", DENSITY),
+    "velocity": Quantity("velocity along the coordinate of the profile", VELOCITY),
+    "velocity_phi": Quantity("velocity across the radius", VELOCITY),
+    "speed": Quantity("size of the velocity", VELOCITY),
+    "pressure": Quantity("pressure", PRESSURE),
+    "internal_energy": Quantity("internal energy per unit mass", SPECIFIC_ENERGY),
+    "stress": Quantity("compressive stress -sigma_xx", PRESSURE),
+    "von_mises": Quantity("von Mises stress", PRESSURE),
+    "plastic_strain": Quantity("equivalent plastic strain"),
+}
+
+
 def exponents(unit: str) -> tuple[int, int, int] | None:
     """Return the exponents of length, mass and time in a unit; None for other units.
 

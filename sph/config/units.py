@@ -97,12 +97,13 @@ class Units(Section):
         """
         if not self.are_given:
             return ""
+        factors = self.factors(length, mass, time)
+        return " ".join(name + (f"^{power}" if power != 1 else "") for name, power in factors)
+
+    def factors(self, length: int, mass: int, time: int) -> list[tuple[str, int]]:
+        """Return names and powers of the units in a unit with these exponents."""
         powers = (("mass", mass), ("length", length), ("time", time))
-        return " ".join(
-            self._name(name) + (f"^{power}" if power != 1 else "")
-            for name, power in powers
-            if power
-        )
+        return [(self._name(name), power) for name, power in powers if power]
 
     def _name(self, name: str) -> str:
         given = getattr(self, name)

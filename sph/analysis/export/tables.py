@@ -7,27 +7,18 @@ from pathlib import Path
 
 import numpy as np
 
+from sph import meanings
 from sph.analysis import truth
 from sph.analysis.export import fields
 from sph.output.checkpoint import Checkpoint
 from sph.output.files import replacing
 from sph.problems.support import uniaxial
+from sph.quantity import FIELDS
 from sph.state import Public
 
 AXES = "xyz"
 TENSOR = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
 PLACE = Public("", 1, 0, 0, 0, "Position")
-# Columns of profiles.
-PROFILE = {
-    "x": PLACE,
-    "r": Public("", 1, 0, 0, 0, "Distance from the centre of the problem"),
-    "density": Public("", -3, 1, 0, 0, "Density"),
-    "velocity": Public("", 1, 0, -1, 0, "Velocity along the coordinate of the profile"),
-    "velocity_phi": Public("", 1, 0, -1, 0, "Velocity across the radius"),
-    "pressure": Public("", -1, 1, -2, 0, "Pressure"),
-    "internal_energy": Public("", 2, 0, -2, 0, "Internal energy per unit mass"),
-    "stress": Public("", -1, 1, -2, 0, "Compressive stress -sigma_xx"),
-}
 BLOCK = 100_000  # rows that are made into text at once
 
 
@@ -78,19 +69,19 @@ def _columns(checkpoint: Checkpoint) -> Iterator[tuple[str, np.ndarray, Public]]
 
 def write_columns(checkpoint: Checkpoint, directory: Path) -> Path:
     """Write columns.csv: unit and meaning of each column of particles and profile."""
-    rows = [(name, public) for name, _, public in _columns(checkpoint)]
-    if _has_profile(checkpoint):
-        known = dict(rows)
-        for name in profile(checkpoint):
-            rows += [(name, PROFILE[name.removesuffix("_exact")])] * (name not in known)
-    units = [fields.unit_of(checkpoint.config, public) for _, public in rows]
-    exact = [", exact solution" * name.endswith("_exact") for name, _ in rows]
-    meaning = [f"{one.description}{more}" for (_, one), more in zip(rows, exact, strict=True)]
-    return _write(
-        directory / "columns.csv",
-        {"column": np.array([name for name, _ in rows]), "unit": np.array(units),
-         "meaning": np.array(meaning)},
-    )  # fmt: skip
+    config = checkpoint.config
+    rows = {
+        name: (fields.unit_of(config, public), public.description)
+        for name, _, public in _columns(checkpoint)
+    }
+    for name in profile(checkpoint) if _has_profile(checkpoint) else ():
+        known = FIELDS[name.removesuffix("_exact")]
+        exact = ", exact solution" * name.endswith("_exact")
+        row = (meanings.unit_of(config, known), f"{known.help}{exact}")
+        rows.setdefault(name, row)
+    units, texts = zip(*rows.values(), strict=True)
+    columns = {"column": tuple(rows), "unit": units, "meaning": texts}
+    return _write(directory / "columns.csv", {name: np.array(one) for name, one in columns.items()})
 
 
 def write_times(times: Mapping[str, float], directory: Path) -> Path:

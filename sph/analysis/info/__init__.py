@@ -128,7 +128,7 @@ def _figures(config: Config, summary) -> list[Found]:
             {
                 "name": name,
                 "value": value,
-                "unit": meanings.unit_of(config, known),
+                "unit": meanings.unit_of(config, known) if known else None,
                 "meaning": known.help if known else None,
             }
         )
@@ -155,7 +155,7 @@ def _columns(config: Config, rows: dict[str, np.ndarray]) -> list[Found]:
             {
                 "name": name,
                 "last": last if isinstance(last, str) else float(last),
-                "unit": meanings.unit_of(config, known),
+                "unit": meanings.unit_of(config, known) if known else None,
                 "meaning": known.help if known else None,
             }
         )
