@@ -40,7 +40,7 @@ class Problem(base.Problem):
         "output.interval": 0.065,
     }
     limits: ClassVar = {
-        "energy_drift": base.Limit(1e-5, "measured: 4e-7, errors of the time step"),
+        "energy_drift": base.Limit(1e-5, "measured: 2e-7, errors of the time step"),
         "period_error": base.Limit(
             0.03, "measured: 0.010, most of it by gradients at order 0, which no N removes"
         ),
