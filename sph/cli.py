@@ -12,7 +12,7 @@ from pathlib import Path
 
 import click
 
-from sph import cli_studies, standard_streams
+from sph import cli_results, cli_studies, standard_streams
 from sph.docstrings import docstring
 from sph.errors import ConfigError, FileError, NumericalError, SphError
 from sph.shell_words import quoted
@@ -214,6 +214,8 @@ def _with_threads(overrides, threads):
     return [*overrides, *([f"run.threads={threads}"] if threads else [])]
 
 
+main.add_command(cli_results.info)
+main.add_command(cli_results.export)
 main.add_command(cli_studies.sweep)
 main.add_command(cli_studies.report)
 main.add_command(cli_studies.stress)

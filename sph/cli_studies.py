@@ -58,9 +58,12 @@ def sweep(config, varies, overrides, directory, jobs, scheduler, slurm, is_sure)
 @click.option("--reference", type=click.Path(path_type=Path), metavar="DIR",
               help="Compute errors against this run of higher resolution. Default: the errors in "
               "each summary.json.")  # fmt: skip
+@click.option("--html", "as_html", is_flag=True,
+              help="Write report.html, one page without links to other files. DIR may be a single "
+              "run: the page describes that run, and is written into its directory.")  # fmt: skip
 @click.option("-o", "directory", type=click.Path(path_type=Path), metavar="DIR",
               help="Directory of the report. Default: report/ in the first DIR.")  # fmt: skip
-def report(sources, field, norm, cost, by, reference, directory):
+def report(sources, field, norm, cost, by, reference, as_html, directory):
     """Compare the error of several runs with their cost.
 
     DIR is a run directory, or a directory that contains run directories, such as
@@ -70,6 +73,12 @@ def report(sources, field, norm, cost, by, reference, directory):
     from sph.analysis import report as reports
 
     question = reports.Question(field, norm, cost, by, reference)
+    if as_html:
+        from sph.analysis import html
+
+        for path in html.write(sources, question, directory):
+            click.echo(f"wrote {path}")
+        return
     target = directory or sources[0] / "report"
     found = reports.make(sources, question)
     click.echo(reports.in_words(found))

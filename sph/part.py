@@ -11,6 +11,7 @@ from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
+from sph.quantity import Quantity
 from sph.state import Field, State
 
 
@@ -146,7 +147,8 @@ class Part:
     passes: tuple[Pass, ...] = ()
     terms: Mapping[str, Any] = {}  # models that the formulation's pair loops call, by their role
     needs: tuple[str, ...] = ()  # fields that the formulation must compute for this part
-    columns: tuple[str, ...] = ()  # of the history: the names in `energies` and `sums`
+    # of the history, by the names in `energies` and `sums`
+    columns: Mapping[str, Quantity] = {}
     keeps_momentum: bool = True
     exact_pairs: bool = True  # whether forces of pairs are equal and opposite to round-off
     bounds_acceleration: bool = False  # whether |a| bounds the step
@@ -226,9 +228,10 @@ class Part:
         Called before each checkpoint, for checks that take too long for each step.
         """
 
-    def criterion_words(self, criterion: str) -> str | None:
+    @classmethod
+    def criterion_words(cls, criterion: str) -> str | None:
         """Return a description of a criterion of this part, or None for other criteria."""
-        return f"the limit of physics.{self.name}" if criterion == self.name else None
+        return f"the limit of physics.{cls.name}" if criterion == cls.name else None
 
     def held_words(self, criterion: str) -> str | None:
         """Return which setting reduces the Courant number; None unless by this criterion."""

@@ -14,6 +14,7 @@ import json
 from collections.abc import Mapping
 from types import UnionType
 from typing import (
+    Annotated,
     Any,
     Literal,
     NotRequired,
@@ -24,7 +25,9 @@ from typing import (
     is_typeddict,
 )
 
+from sph import quantity
 from sph.clock import STARTING
+from sph.quantity import Quantity
 
 # JSON has no such numbers: summary.json holds them as these strings.
 NON_FINITE = ("nan", "inf", "-inf")
@@ -32,117 +35,179 @@ NON_FINITE = ("nan", "inf", "-inf")
 
 Status = Literal["done", "stopped", "failed"]
 
+FIELD = "unit of the field"
+
 
 class AbsoluteNorms(TypedDict):
     """Norms of the error of a field, in the units of the field (`sph.analysis.errors.norms`)."""
 
-    L1: float
-    L2: float
-    Linf: float
+    L1: Annotated[float, Quantity("mean |error|, weighted by volume", FIELD)]
+    L2: Annotated[float, Quantity("root mean square error, weighted by volume", FIELD)]
+    Linf: Annotated[float, Quantity("largest |error|", FIELD)]
 
 
 class Norms(AbsoluteNorms):
     """With L1 relative to the exact field (`sph.analysis.errors.by_field`)."""
 
-    relative_L1: float | None  # None where the exact field is zero everywhere
+    relative_L1: Annotated[
+        float | None,
+        Quantity("L1 over the mean |exact field|; none where the exact field is zero everywhere"),
+    ]
 
 
 class Errors(TypedDict):
     """Errors at the end of the run, over some of the particles."""
 
-    against: NotRequired[str]  # the exact solution, in words, or else:
-    reference: NotRequired[str]  # the run directory that the errors are against
-    region: str  # where errors are taken, in words
-    particles: int  # in that region
-    fields: dict[str, Norms]  # by density, velocity, pressure, internal_energy, stress
+    against: NotRequired[Annotated[str, Quantity("the exact solution, in words, or else:")]]
+    reference: NotRequired[
+        Annotated[str, Quantity("the run directory that the errors are against")]
+    ]
+    region: Annotated[str, Quantity("where errors are taken, in words")]
+    particles: Annotated[int, Quantity("number of particles in that region")]
+    fields: Annotated[
+        dict[str, Norms],
+        Quantity("by field: density, velocity, pressure, internal_energy, stress"),
+    ]
 
 
 class Conservation(TypedDict):
     """What the run conserved, over its whole history."""
 
-    # Change of energy over the energy at the start (`sph.totals.Baseline`): without bulk motion and
-    # without what sources added. At the end, and its largest modulus at any step.
-    energy_drift: float
-    energy_drift_max: float
-    # Energy that kept internal energies positive: a part of the drift, over the same scale.
-    energy_injected: float
-    # Largest |P - P_0| at any step over sum m (|v - v_bulk| + c_s) of the last state, along the
-    # axes that conserve momentum; None where no axis does (walls, an outer force).
-    momentum_change: float | None
-    # Sum m/rho over the volume of the box, at the end and at the step where it is farthest from 1;
-    # None where gas does not fill a closed box.
-    volume_ratio: float | None
-    volume_ratio_worst: float | None
+    energy_drift: Annotated[
+        float,
+        Quantity(
+            "change of energy since the start over the energy at the start, without bulk motion "
+            "and without the energy that sources added; at the end"
+        ),
+    ]
+    energy_drift_max: Annotated[float, Quantity("largest |energy drift| at any step")]
+    energy_injected: Annotated[
+        float,
+        Quantity(
+            "energy that kept internal energies positive, a part of the drift, over the energy at "
+            "the start"
+        ),
+    ]
+    momentum_change: Annotated[
+        float | None,
+        Quantity(
+            "largest |P - P_0| at any step over the sum of m (|v - v_bulk| + c_s) of the last "
+            "state, along axes that conserve momentum; none where no axis does"
+        ),
+    ]
+    volume_ratio: Annotated[
+        float | None,
+        Quantity(
+            "sum of m/rho over the volume of the box, at the end; none where gas does not fill a "
+            "closed box"
+        ),
+    ]
+    volume_ratio_worst: Annotated[
+        float | None, Quantity("volume_ratio at the step where it is farthest from 1")
+    ]
 
 
 class Nearest(TypedDict):
     """Distance to the nearest neighbour at the end of the run, in particle spacings."""
 
-    median: float
-    smallest: float
+    median: Annotated[float, Quantity("median over the particles, in particle spacings")]
+    smallest: Annotated[float, Quantity("smallest of all particles, in particle spacings")]
 
 
 class Tearing(TypedDict):
     """Solid bodies, and their connected pieces at the end of the run (eq 454)."""
 
-    bodies: int
-    pieces: int
+    bodies: Annotated[int, Quantity("number of solid bodies")]
+    pieces: Annotated[int, Quantity("number of their connected pieces at the end, eq 454")]
 
 
 class Session(TypedDict):
     """Cost of the last session, that is of one call of `sph run` or `sph restart`."""
 
-    steps: int
-    updates: int  # of a particle: particles times steps, unless steps are individual
-    updates_per_cpu_second: int | None
-    cpu_seconds: float
-    wall_seconds: float
-    compile_cpu_seconds: float  # CPU time of compilation, which `cpu_seconds` leaves out
-    phases_cpu_seconds: dict[str, float]  # by phase; also STARTING, which `cpu_seconds` leaves out
-    list_builds: int  # of the neighbour lists
-    peak_memory_bytes: int
+    steps: Annotated[int, Quantity("number of steps")]
+    updates: Annotated[
+        int,
+        Quantity(
+            "number of updates of a particle: particles times steps, unless steps are individual"
+        ),
+    ]
+    updates_per_cpu_second: Annotated[
+        int | None, Quantity("updates over cpu_seconds", "(CPU s)^-1")
+    ]
+    cpu_seconds: Annotated[
+        float,
+        Quantity("CPU time, without compilation and the start of Numba", quantity.CPU_SECONDS),
+    ]
+    wall_seconds: Annotated[float, Quantity("elapsed time, with compilation", quantity.SECONDS)]
+    compile_cpu_seconds: Annotated[float, Quantity("CPU time of compilation", quantity.CPU_SECONDS)]
+    phases_cpu_seconds: Annotated[
+        dict[str, float],
+        Quantity(
+            "CPU time by phase of a step, without compilation; also the start of Numba, which "
+            "cpu_seconds leaves out",
+            quantity.CPU_SECONDS,
+        ),
+    ]
+    list_builds: Annotated[int, Quantity("number of times that neighbour lists were built")]
+    peak_memory_bytes: Annotated[int, Quantity("largest resident memory of the process", "bytes")]
 
 
 class Cost(TypedDict):
     """Cost of the run: of all its sessions, and of the last one."""
 
-    cpu_seconds: float
-    wall_seconds: float
-    threads: int  # of the last session
-    updates: NotRequired[int]  # of a particle; not in summaries of earlier versions
-    session: Session
+    cpu_seconds: Annotated[
+        float, Quantity("CPU time of all sessions, without compilation", quantity.CPU_SECONDS)
+    ]
+    wall_seconds: Annotated[
+        float, Quantity("elapsed time of all sessions, with compilation", quantity.SECONDS)
+    ]
+    threads: Annotated[int, Quantity("number of threads of the last session")]
+    # not in summaries of earlier versions
+    updates: NotRequired[Annotated[int, Quantity("number of updates of a particle")]]
+    session: Annotated[Session, Quantity("cost of the last session")]
 
 
 class Warned(TypedDict):
     """A warning that the run ended with (`sph.warnings`)."""
 
-    kind: str
-    text: str
+    kind: Annotated[str, Quantity("short name, see docs/warnings.md")]
+    text: Annotated[str, Quantity("the warning, in words")]
 
 
 class Summary(TypedDict):
     """A run that has ended."""
 
-    status: Status
-    reason: str | None  # why the run stopped or failed
-    warnings: list[Warned]
-    version: str  # of sph
-    problem: str
-    dimension: int
-    particles: int
-    time: float  # reached
-    steps: int  # of all sessions
-    lineage: list[str]  # a sentence for each restart
-    settings_changed: list[str]  # by restarts
-    errors: Errors | None
-    errors_left_out: str | None  # why there are no errors
-    report: dict[str, float] | None  # the problem's own figures; None where the run failed
-    conservation: Conservation
-    nearest: Nearest | None  # None where the run failed
-    tearing: NotRequired[Tearing]  # not without solid bodies, nor where the run failed
-    cost: Cost
-    compiled_in: list[str]  # parts of the scene
-    left_out: list[str]  # parts that the scene does without
+    status: Annotated[Status, Quantity('"done", "stopped" or "failed"')]
+    reason: Annotated[str | None, Quantity("why the run stopped or failed; none if done")]
+    warnings: Annotated[list[Warned], Quantity("assumptions of the result that do not hold")]
+    version: Annotated[str, Quantity("version of sph that ended the run")]
+    problem: Annotated[str, Quantity("name of the problem")]
+    dimension: Annotated[int, Quantity("number of space dimensions")]
+    particles: Annotated[int, Quantity("number of particles")]
+    time: Annotated[float, Quantity("time that the run reached", quantity.TIME)]
+    steps: Annotated[int, Quantity("number of steps of all sessions")]
+    lineage: Annotated[list[str], Quantity("a sentence for each restart")]
+    settings_changed: Annotated[list[str], Quantity("settings that restarts changed")]
+    errors: Annotated[
+        Errors | None, Quantity("errors of the last state; none where they are left out")
+    ]
+    errors_left_out: Annotated[str | None, Quantity("why there are no errors")]
+    report: Annotated[
+        dict[str, float] | None,
+        Quantity("figures of the problem, listed with it; none where the run failed"),
+    ]
+    conservation: Annotated[Conservation, Quantity("what the run conserved, at any step")]
+    nearest: Annotated[
+        Nearest | None,
+        Quantity("distance to the nearest neighbour at the end; none where the run failed"),
+    ]
+    # not without solid bodies, nor where the run failed
+    tearing: NotRequired[
+        Annotated[Tearing, Quantity("pieces of solid bodies; only of runs with solids")]
+    ]
+    cost: Annotated[Cost, Quantity("cost of all sessions, and of the last one")]
+    compiled_in: Annotated[list[str], Quantity("physics that the run computed")]
+    left_out: Annotated[list[str], Quantity("physics that the run left out, and why")]
 
 
 def of_json(text: str) -> Summary:

@@ -1,5 +1,6 @@
 """How many processes run the tests by default, and the texts of messages that users see."""
 
+import functools
 from pathlib import Path
 
 import pytest
@@ -41,6 +42,33 @@ def pytest_sessionfinish(session):
 
 def id_of(item) -> str:
     return f"{item.path.relative_to(HERE).as_posix()}::{item.name}"
+
+
+@pytest.fixture(autouse=True, scope="session")
+def every_figure_has_a_meaning():
+    """Any test in which a problem returns a column or figure that it does not declare fails."""
+    from sph import registry
+
+    with pytest.MonkeyPatch.context() as patch:
+        for name in registry.names("sph.problems"):
+            problem = registry.load("sph.problems", name).Problem
+            for method in ("diagnostics", "report", "compare", "over_time"):
+                if method in vars(problem):
+                    patch.setattr(problem, method, _declared(vars(problem)[method]))
+        yield
+
+
+def _declared(method):
+    from sph.quantity import meaning
+
+    @functools.wraps(method)
+    def checked(self, *arguments):
+        found = method(self, *arguments)
+        missing = [name for name in found if meaning(self.quantities, name) is None]
+        assert not missing, f"{type(self).__module__}: quantities lack {missing}"
+        return found
+
+    return checked
 
 
 @pytest.fixture

@@ -14,6 +14,7 @@ from sph.config.errors import suggestion
 from sph.config.physics import Physics
 from sph.config.sections import RESOURCES, SECTIONS, Output, Report, Run, Time
 from sph.config.toml_text import key_text, value_text
+from sph.config.units import Units
 from sph.errors import ConfigError
 from sph.problems.base import Problem
 
@@ -28,6 +29,7 @@ class Config:
     output: Output
     report: Report
     run: Run
+    units: Units
 
     def to_toml(self) -> str:
         """Return all keys in declared order as TOML that reads back to an equal configuration."""
@@ -86,7 +88,8 @@ def _names() -> list[str]:
 def _tables(config: Config) -> dict[str, dict[str, Any]]:
     sections: dict[str, BaseModel] = {name: getattr(config, name) for name in _names()}
     # TOML cannot express None, the value of a key that is not set (gamma if eos is given).
-    return {name: section.model_dump(exclude_none=True) for name, section in sections.items()}
+    found = {name: section.model_dump(exclude_none=True) for name, section in sections.items()}
+    return {name: keys for name, keys in found.items() if keys}  # [units] may be empty
 
 
 def _text(tables: dict[str, dict[str, Any]]) -> str:

@@ -6,6 +6,7 @@ from typing import Annotated, ClassVar, Literal
 from pydantic import AfterValidator, Field
 
 from sph.config.restarts import FREE, RECORDED, REFUSED, class_of
+from sph.config.units import Units
 from sph.problems.base import Section
 
 Count = Annotated[int, Field(ge=1)]
@@ -80,4 +81,5 @@ SECTIONS: dict[str, type[Section]] = {
     "output": Output,
     "report": Report,
     "run": Run,
+    "units": Units,
 }

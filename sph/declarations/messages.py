@@ -1,8 +1,10 @@
 """Errors of declarations: they name the class and say what is expected."""
 
+from collections.abc import Mapping
 from typing import Any
 
 from sph.errors import DeclarationError
+from sph.quantity import Quantity
 
 
 def check_entries(kind: type, name: str, found: Any, expected: type) -> None:
@@ -13,6 +15,19 @@ def check_entries(kind: type, name: str, found: Any, expected: type) -> None:
     for one in found:
         if not isinstance(one, expected):
             raise wrong(kind, f"{name}: {one!r:.60} is not a {_named(expected)}")
+
+
+def check_quantities(kind: type, name: str, found: Any) -> None:
+    """Check that an attribute maps names to quantities with a help text."""
+    example = '{"tether_energy": Quantity("energy of the springs", "mass length^2 time^-2")}'
+    if not isinstance(found, Mapping):
+        raise wrong(kind, f"{name} = {found!r:.60}: expected names with quantities, as {example}")
+    for key, one in found.items():
+        if not isinstance(one, Quantity) or not one.help:
+            raise wrong(
+                kind, f"{name}: {key!r} has no meaning: expected a Quantity with a help text and a "
+                f"unit, as {example}"
+            )  # fmt: skip
 
 
 def _named(kind: Any) -> str:

@@ -4,7 +4,8 @@ import re
 from collections.abc import Iterable, Sequence
 from typing import Any
 
-from sph.declarations.messages import check_entries, label, wrong
+from sph import columns
+from sph.declarations.messages import check_entries, check_quantities, label, wrong
 from sph.part import STAGES, Evolved, Key, Part, Pass, Rule
 from sph.state import Field, Public, State
 
@@ -20,13 +21,7 @@ NOT_FIELDS = {
     *dir(State), "fields", "time", "step", "next_step", "list_position", "list_support",
     "list_skin", "energy_injected", "energy_added", "baseline_energy", "baseline_scale",
 }  # fmt: skip
-NOT_COLUMNS = {
-    "step", "t", "dt", "limiter_particle", "limiter", "kinetic_energy",
-    "kinetic_energy_without_bulk", "internal_energy", "total_energy", "energy_drift",
-    "energy_injected", "energy_added", "momentum_x", "momentum_y", "momentum_z", "min_density",
-    "max_density", "min_internal_energy", "max_internal_energy", "wall_seconds", "cpu_seconds",
-    "held_supports", "volume_ratio",
-}  # fmt: skip
+NOT_COLUMNS = {*columns.OF_ALL, *columns.OF_SOME}
 
 
 # --- classes of parts -------------------------------------------------------------------------
@@ -82,11 +77,12 @@ def check_part(part: Any, kind: type[Part], optional: bool) -> None:
     if not isinstance(part, kind):
         raise wrong(kind, f"of(scene) returned {part!r}, expected a {kind.__name__} or None")
     for name, expected in (
-        ("fields", Field), ("evolved", Evolved), ("passes", Pass), ("needs", str), ("columns", str),
+        ("fields", Field), ("evolved", Evolved), ("passes", Pass), ("needs", str),
     ):  # fmt: skip
         check_entries(kind, name, getattr(part, name), expected)
     for field in part.fields:
         _check_field(kind, field)
+    check_quantities(kind, "columns", part.columns)
     for column in part.columns:
         if not NAME.fullmatch(column) or column in NOT_COLUMNS:
             raise wrong(
@@ -158,7 +154,7 @@ def check_together(parts: Sequence[Part], kinds: Iterable[type[Part]], roles: An
     terms: dict[str, Part] = {}
     owners: dict[str, Part] = {}
     publics: dict[str, str] = {}
-    columns: dict[str, Part] = {}
+    taken: dict[str, Part] = {}
     reserved = {name: kind for kind in kinds for name in kind.reserves}
     for part in parts:
         for field in part.fields:
@@ -175,10 +171,10 @@ def check_together(parts: Sequence[Part], kinds: Iterable[type[Part]], roles: An
                     )  # fmt: skip
                 publics[field.public.name] = name
         for column in part.columns:
-            if column in columns:
-                other = label(type(columns[column]))
+            if column in taken:
+                other = label(type(taken[column]))
                 raise wrong(type(part), f"column {column!r} is declared by {other} too")
-            columns[column] = part
+            taken[column] = part
         for role in part.terms:
             if role not in roles:
                 expected = f"one of {', '.join(roles)}" if roles else "none"

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
+from sph import columns
 from sph.errors import FileError
 from sph.output.files import check_in_place, explained, open_to_append, read_text, write_text
 
@@ -29,30 +30,6 @@ ALONE = (
 SAME_SUM = 1e-6
 
 
-def columns(dimension: int) -> list[str]:
-    """Return the columns of every run, in code units. `limiter_particle` is a particle ID."""
-    return [
-        "step",
-        "t",
-        "dt",
-        "limiter_particle",
-        "limiter",
-        "kinetic_energy",
-        "kinetic_energy_without_bulk",
-        "internal_energy",
-        "total_energy",
-        "energy_drift",
-        "energy_injected",
-        *(f"momentum_{axis}" for axis in "xyz"[:dimension]),
-        "min_density",
-        "max_density",
-        "min_internal_energy",
-        "max_internal_energy",
-        "wall_seconds",
-        "cpu_seconds",
-    ]
-
-
 class History:
     """Writes history.csv. Rows are kept in memory until `flush`, which writes whole lines.
 
@@ -68,8 +45,8 @@ class History:
 
     @classmethod
     def create(cls, path: Path, dimension: int, extra: Sequence[str] = ()) -> "History":
-        """Create a history with the columns `columns(dimension)` and `extra`. Raises FileError."""
-        names = [*columns(dimension), *extra]
+        """Create a history with the columns of every run and `extra`. Raises FileError."""
+        names = [*columns.shared(dimension), *extra]
         write_text(Path(path), _as_text([names]))
         return cls(Path(path), names)
 
@@ -117,10 +94,10 @@ class History:
 def read(path: Path) -> dict[str, np.ndarray]:
     """Return the columns of a history, each (steps,): float64, or object for columns of text.
 
-    An incomplete last line is ignored. Raises FileError, also if a column of `columns` is missing.
+    An incomplete last line is ignored. Raises FileError, also if a column of every run is missing.
     """
     names, rows = _names_and_rows(Path(path))
-    _check_columns(Path(path), names, columns(1))
+    _check_columns(Path(path), names, columns.shared(1))
     by_column = zip(*rows, strict=True) if rows else [()] * len(names)
     return {
         name: np.array(values, dtype=object if name in TEXT_COLUMNS else np.float64)
@@ -140,7 +117,7 @@ def check(
     """
     path = Path(path)
     names, rows = _names_and_rows(path)
-    ours = columns(dimension)
+    ours = columns.shared(dimension)
     _check_columns(path, names, [*ours, *diagnostics])
     foreign = [one for one in names if one not in (*ours, *diagnostics, *optional)]
     if foreign:

@@ -23,14 +23,6 @@ Rows = Callable[[np.ndarray], np.ndarray]
 # four copies. With half of this, HDF5 kept 13 MB more after it had closed the file.
 LARGEST_CHUNK = 1_572_864
 
-CENTIMETRE_GRAM_SECOND = {
-    "Unit mass in cgs (U_M)": 1.0,
-    "Unit length in cgs (U_L)": 1.0,
-    "Unit time in cgs (U_t)": 1.0,
-    "Unit current in cgs (U_I)": 1.0,
-    "Unit temperature in cgs (U_T)": 1.0,
-}
-
 
 # Columns of a symmetric tensor, SWIFT's: xx, yy, zz, xy, xz, yz. Not (n, 3, 3), which pynbody 2.8
 # refuses to load.
@@ -89,7 +81,7 @@ def write_public(file: h5py.File, checkpoint) -> None:
     group = hdf5.create_group(root, "PartType0")
     for public, array, in_rows in _fields(checkpoint, frame):
         dataset = write_rows(group, public.name, array, in_rows)
-        hdf5.write_attributes(dataset, _unit_attributes(public))
+        hdf5.write_attributes(dataset, _unit_attributes(public, checkpoint.config.units))
         del dataset  # closes it, which frees its chunks
     for link, target in SINGULAR.items():
         hdf5.link(group, link, f"/PartType0/{target}")
@@ -148,6 +140,7 @@ USUAL: tuple[Rows, ...] = (_scalar, _vector, _tensor)  # by rank
 def _header(checkpoint, frame: Frame) -> dict[str, Mapping]:
     """Attributes of each group that holds nothing else."""
     physics, dimension = checkpoint.config.physics, checkpoint.particles.dimension
+    units = _units(checkpoint.config.units)
     # Six kinds of particle, gas first: yt reads six and no more.
     number = np.array([checkpoint.particles.number, 0, 0, 0, 0, 0])
     return {
@@ -165,9 +158,10 @@ def _header(checkpoint, frame: Frame) -> dict[str, Mapping]:
             "Scale-factor": np.array([1.0]),
             "Dimension": np.array([3]),  # pynbody takes no other; the true one is in HydroScheme
             "Flag_Entropy_ICs": np.array([0]),
+            "UnitsGiven": np.array([int(checkpoint.config.units.are_given)]),
         },
-        "Units": _one_element(CENTIMETRE_GRAM_SECOND),
-        "InternalCodeUnits": _one_element(CENTIMETRE_GRAM_SECOND),
+        "Units": units,
+        "InternalCodeUnits": units,
         "Cosmology": {"Cosmological run": np.array([0])},
         "Policy": {"cosmological integration": np.array([0])},
         # scalars, for yt, which knows cubic boxes only
@@ -186,6 +180,20 @@ def _header(checkpoint, frame: Frame) -> dict[str, Mapping]:
             "CFL parameter": np.array([physics.C]),
         },
     }
+
+
+def _units(units) -> dict[str, np.ndarray]:
+    """The unit of each base quantity in cgs: readers need a number, also where none is given."""
+    length, mass, time = units.in_cgs()
+    return _one_element(
+        {
+            "Unit mass in cgs (U_M)": mass,
+            "Unit length in cgs (U_L)": length,
+            "Unit time in cgs (U_t)": time,
+            "Unit current in cgs (U_I)": 1.0,
+            "Unit temperature in cgs (U_T)": 1.0,
+        }
+    )
 
 
 def _eta(checkpoint) -> float:
@@ -207,7 +215,7 @@ def _one_element(numbers: Mapping[str, float]) -> dict[str, np.ndarray]:
     return {name: np.array([number]) for name, number in numbers.items()}
 
 
-def _unit_attributes(field: Public) -> dict:
+def _unit_attributes(field: Public, units) -> dict:
     return _one_element(
         {
             "U_L exponent": float(field.length),
@@ -217,6 +225,8 @@ def _unit_attributes(field: Public) -> dict:
             "U_T exponent": 0.0,
             "a-scale exponent": float(field.scale_factor),
             "h-scale exponent": 0.0,
-            "Conversion factor to CGS (not including cosmological corrections)": 1.0,
+            "Conversion factor to CGS (not including cosmological corrections)": units.factor(
+                field.length, field.mass, field.time
+            ),
         }
     ) | {"Description": np.bytes_(field.description)}

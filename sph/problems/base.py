@@ -9,6 +9,8 @@ import numpy as np
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field
 from pydantic_core import PydanticCustomError
 
+from sph.quantity import Quantity
+
 Boundary = Literal["periodic", "mirror", "open"]
 
 
@@ -78,6 +80,8 @@ class Problem(Section):
       truth      what `exact` returns, as a phrase and as a label in figures: an exact solution, or
                  a reference solution from another method
       profiled   whether figures show profiles over x or over the distance; otherwise, maps
+      quantities meaning and unit of the columns of `diagnostics` and of the figures of `report`,
+                 `compare` and `over_time`, by name; see `sph.quantity.meaning`
       profiles   the four fields of these profiles; solids have "stress", which is -sigma_xx
     """
 
@@ -87,6 +91,7 @@ class Problem(Section):
     ideal_gas: ClassVar[bool] = False
     radial: ClassVar[bool] = False
     swamped: ClassVar[dict[str, Limit]] = {}
+    quantities: ClassVar[Mapping[str, Quantity]] = {}
     truth: ClassVar[tuple[str, str]] = ("the exact solution", "exact")
     profiled: ClassVar[bool] = True
     profiles: ClassVar[tuple[str, ...]] = ("density", "velocity", "pressure", "internal_energy")

@@ -12,9 +12,11 @@ from typing import Annotated, ClassVar, Literal
 import numpy as np
 from pydantic import Field, field_validator
 
+from sph import quantity as units
 from sph.eos import is_gamma_law
 from sph.exact import finite_volume
 from sph.problems import base
+from sph.quantity import Quantity
 
 _SHARED = base.Problem.model_fields
 
@@ -42,6 +44,10 @@ class Problem(base.Problem):
         "density_L1_relative": base.Limit(
             0.05, "measured: 0.034, and 0.060 with the averaged gradient of grad_h"
         ),
+    }
+    quantities: ClassVar = {
+        "peak_density": Quantity("largest density of a particle", units.DENSITY),
+        "density_L1_relative": Quantity("sum of V |error of rho| over the sum of V rho, exact"),
     }
 
     name: Literal["blast_waves"] = "blast_waves"

@@ -12,6 +12,7 @@ from pydantic import Field, model_validator
 
 from sph.problems import base
 from sph.problems.support import lattice as placement
+from sph.quantity import Quantity
 
 _SHARED = base.Problem.model_fields
 
@@ -39,6 +40,15 @@ class Problem(base.Problem):
         "cloud_velocity": base.Limit(
             1.0, "the wind cannot accelerate the cloud beyond the wind's speed"
         ),
+    }
+    quantities: ClassVar = {
+        "cloud_mass_fraction": Quantity(
+            "mass of dense, cold gas over the initial mass of the cloud"
+        ),
+        "cloud_velocity": Quantity(
+            "mean velocity along x of the particles of the initial cloud, over the wind speed"
+        ),
+        "growth_times": Quantity("time in units of the growth time of Kelvin-Helmholtz waves"),
     }
 
     name: Literal["blob"] = "blob"

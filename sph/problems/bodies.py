@@ -11,11 +11,13 @@ from typing import Annotated, Any, ClassVar, Literal, NamedTuple
 import numpy as np
 from pydantic import Field, PrivateAttr, model_validator
 
+from sph import quantity as units
 from sph.errors import ConfigError
 from sph.problems import base
 from sph.problems._body import Body
 from sph.problems.base import Fault
 from sph.problems.support import bodies as placement
+from sph.quantity import Quantity
 
 _SHARED = base.Problem.model_fields
 
@@ -43,6 +45,12 @@ class Problem(base.Problem):
         "momentum_change": base.Limit(1e-12, "pair forces are equal and opposite: only round-off"),
     }
     profiled: ClassVar = False
+    quantities: ClassVar = {
+        "body_*_velocity_*": Quantity(
+            "velocity of the centre of mass of a body, by its number from 0, along an axis",
+            units.VELOCITY,
+        ),
+    }
 
     name: Literal["bodies"] = "bodies"
     dimension: Annotated[int, _SHARED["dimension"]] = 2

@@ -12,6 +12,7 @@ from pydantic import Field, model_validator
 
 from sph.problems import base
 from sph.problems.support import lattice as placement
+from sph.quantity import Quantity
 
 _SHARED = base.Problem.model_fields
 
@@ -37,6 +38,12 @@ class Problem(base.Problem):
             0.25,
             "kernels smooth the kink of the density at a mirror: 20 % there, 1 % in the L1 norm",
         ),
+    }
+    quantities: ClassVar = {
+        "mach_number": Quantity("largest ratio of velocity to local speed of sound"),
+        "density_ratio": Quantity("largest over smallest density"),
+        "support_ratio": Quantity("largest over smallest support radius"),
+        "pressure_error": Quantity("largest |P/P_0 - 1|"),
     }
 
     name: Literal["contrast"] = "contrast"

@@ -16,10 +16,12 @@ from typing import Annotated, Any, ClassVar, Literal
 import numpy as np
 from pydantic import Field, PrivateAttr, field_validator, model_validator
 
+from sph import quantity as units
 from sph.exact import solid_shocks
 from sph.problems import base
 from sph.problems.support import lattice as placement
 from sph.problems.support import oscillation, uniaxial
+from sph.quantity import Quantity
 
 _SHARED = base.Problem.model_fields
 
@@ -45,6 +47,14 @@ class Problem(base.Problem):
     }
     profiles: ClassVar = ("density", "velocity", "stress", "internal_energy")
     truth: ClassVar = ("linear theory", "linear theory")
+    quantities: ClassVar = {
+        "mode_velocity": Quantity("amplitude of the velocity of the mode", units.VELOCITY),
+        "wave_speed": Quantity("wave speed from the frequency of the mode", units.VELOCITY),
+        "wave_speed_exact": Quantity("wave speed of eq 415", units.VELOCITY),
+        "wave_speed_error": Quantity("wave_speed over wave_speed_exact, minus 1"),
+        "wave_speed_deviation": Quantity("absolute value of wave_speed_error"),
+        "mode_damping": Quantity("rate at which the amplitude falls, over the angular frequency"),
+    }
 
     name: Literal["elastic_bar"] = "elastic_bar"
     dimension: Annotated[int, _SHARED["dimension"]] = 1

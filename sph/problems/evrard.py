@@ -12,9 +12,11 @@ from typing import Annotated, ClassVar, Literal, NamedTuple
 import numpy as np
 from pydantic import Field, PrivateAttr, model_validator
 
+from sph import quantity as units
 from sph.exact import evrard, finite_volume, sphere
 from sph.problems import base
 from sph.problems.support import lattice as placement
+from sph.quantity import Quantity, compared
 
 _SHARED = base.Problem.model_fields
 
@@ -55,6 +57,25 @@ class Problem(base.Problem):
         "internal_maximum_error": base.Limit(0.36, f"{_FIRST_ORDER}: 0.31 measured"),
         "kinetic_maximum_error": base.Limit(0.57, f"{_FIRST_ORDER}: 0.52 measured"),
     }
+    quantities: ClassVar = compared(
+        {
+            "half_mass_radius": Quantity(
+                "radius of the sphere that holds half of the particles", units.LENGTH
+            ),
+            "shock_radius": Quantity(
+                "radius where the radial velocity falls most steeply", units.LENGTH
+            ),
+            "potential_minimum": Quantity(
+                "lowest gravitational energy, at the bounce", units.ENERGY
+            ),
+            "potential_minimum_time": Quantity("time of potential_minimum", units.TIME),
+            "internal_maximum": Quantity("largest internal energy, at the bounce", units.ENERGY),
+            "internal_maximum_time": Quantity("time of internal_maximum", units.TIME),
+            "kinetic_maximum": Quantity("largest kinetic energy before the bounce", units.ENERGY),
+            "kinetic_maximum_time": Quantity("time of kinetic_maximum", units.TIME),
+        },
+        to="reference",
+    )
 
     name: Literal["evrard"] = "evrard"
     dimension: Literal[3] = Field(default=3, description="number of space dimensions")

@@ -9,9 +9,11 @@ from typing import Annotated, ClassVar, Literal
 import numpy as np
 from pydantic import Field, field_validator
 
+from sph import quantity as units
 from sph.exact import expanding_ball
 from sph.problems import base
 from sph.problems.support import lattice as placement
+from sph.quantity import Quantity
 
 _SHARED = base.Problem.model_fields
 
@@ -41,6 +43,19 @@ class Problem(base.Problem):
         "kinetic_share_error": base.Limit(
             0.002, "measured: 4e-4; viscosity would delay the conversion to motion"
         ),
+    }
+    quantities: ClassVar = {
+        "radius": Quantity("largest distance of a particle from the centre", units.LENGTH),
+        "radius_exact": Quantity("exact radius of the ball", units.LENGTH),
+        "front_speed": Quantity("largest outward velocity of a particle", units.VELOCITY),
+        "front_speed_exact": Quantity("exact outward velocity of the surface", units.VELOCITY),
+        "front_speed_over_bound": Quantity(
+            "front_speed over 2 c/(gamma - 1), the bound for expansion from rest, with c at the "
+            "centre at t = 0"
+        ),
+        "kinetic_share": Quantity("kinetic energy over the sum of kinetic and internal energy"),
+        "kinetic_share_exact": Quantity("exact value of kinetic_share"),
+        "kinetic_share_error": Quantity("|kinetic_share - kinetic_share_exact|"),
     }
 
     name: Literal["expanding_ball"] = "expanding_ball"

@@ -50,6 +50,7 @@ class Problem(base.Problem):
         ),
     }
     profiles: ClassVar = ("density", "velocity", "stress", "internal_energy")
+    quantities: ClassVar = solid_fronts.QUANTITIES
 
     name: Literal["flyer_plate"] = "flyer_plate"
     dimension: Annotated[int, _SHARED["dimension"]] = 1

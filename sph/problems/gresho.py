@@ -9,10 +9,12 @@ from typing import Annotated, ClassVar, Literal
 import numpy as np
 from pydantic import Field
 
+from sph import quantity as units
 from sph.problems import base
 from sph.problems.base import wide
 from sph.problems.support import lattice as placement
 from sph.problems.support.vortex import from_centre, rotation
+from sph.quantity import Quantity
 
 _SHARED = base.Problem.model_fields
 
@@ -37,6 +39,17 @@ class Problem(base.Problem):
         ),
         "error_v_phi": base.Limit(
             0.031, "measured: 0.0263 with the shipped settings, which use hundreds of neighbours"
+        ),
+    }
+    quantities: ClassVar = {
+        "error_v_phi": Quantity(
+            "volume-weighted mean of |v_phi - exact| in the whole box", units.VELOCITY
+        ),
+        "peak_v_phi": Quantity(
+            "largest mean v_phi of rings one particle spacing wide", units.VELOCITY
+        ),
+        "peak_v_phi_exact": Quantity(
+            "peak_v_phi, computed from exact velocities at the particles", units.VELOCITY
         ),
     }
 

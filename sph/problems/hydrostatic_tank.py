@@ -11,10 +11,12 @@ from typing import Annotated, Any, ClassVar, Literal
 import numpy as np
 from pydantic import Field, PrivateAttr, model_validator
 
+from sph import quantity as units
 from sph import registry
 from sph.problems import base
 from sph.problems.support import solids
 from sph.problems.support.lattice import fill
+from sph.quantity import Quantity
 
 _SHARED = base.Problem.model_fields
 
@@ -39,6 +41,18 @@ class Problem(base.Problem):
         "settling": base.Limit(1e-3, "measured: 4e-5, of a compression by 5e-3"),
     }
     profiled: ClassVar = False
+    quantities: ClassVar = {
+        "rms_velocity": Quantity("root mean square velocity over (g depth)^(1/2)"),
+        "centre_of_mass": Quantity("height y of the centre of mass", units.LENGTH),
+        "velocity_noise": Quantity(
+            "root mean square of rms_velocity over the last tenth of the run"
+        ),
+        "settling": Quantity(
+            "how far the centre of mass has fallen since the start, on average over the last tenth "
+            "of the run, over the depth"
+        ),
+        "pressure_error": Quantity("mean error of the pressure over the pressure at the bottom"),
+    }
 
     name: Literal["hydrostatic_tank"] = "hydrostatic_tank"
     dimension: Literal[2] = Field(default=2, description="number of space dimensions")

@@ -8,10 +8,12 @@ from typing import Annotated, ClassVar, Literal
 import numpy as np
 from pydantic import Field
 
+from sph import quantity as units
 from sph.problems import base
 from sph.problems.base import only
 from sph.problems.support.lattice import grid, unit_cell
 from sph.problems.support.shear_mode import mode_amplitude
+from sph.quantity import Quantity
 
 _SHARED = base.Problem.model_fields
 
@@ -38,6 +40,12 @@ class Problem(base.Problem):
         "energy_drift": base.Limit(
             1e-3, "subsonic flow in pressure equilibrium, with less work than in a shock tube"
         )
+    }
+    quantities: ClassVar = {
+        "mode_amplitude": Quantity(
+            "amplitude of the mode in the velocity away from the slab", units.VELOCITY
+        ),
+        "growth_time": Quantity("growth time of the mode in linear theory", units.TIME),
     }
 
     name: Literal["kelvin_helmholtz"] = "kelvin_helmholtz"

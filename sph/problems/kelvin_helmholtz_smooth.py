@@ -10,11 +10,13 @@ from typing import Annotated, ClassVar, Literal
 import numpy as np
 from pydantic import Field
 
+from sph import quantity as units
 from sph.exact import kelvin_helmholtz as linear
 from sph.problems import base
 from sph.problems.base import only
 from sph.problems.support.lattice import fill
 from sph.problems.support.shear_mode import mode_amplitude, surface_weight
+from sph.quantity import Quantity
 
 _SHARED = base.Problem.model_fields
 
@@ -49,6 +51,16 @@ class Problem(base.Problem):
     }
     swamped: ClassVar = {
         "growth_ratio": base.Limit(0.25, "a quarter of the linear growth rate", at_least=True)
+    }
+    quantities: ClassVar = {
+        "mode_amplitude": Quantity("amplitude of the mode in the velocity along y", units.VELOCITY),
+        "growth_rate": Quantity(
+            "growth rate of mode_amplitude from t = 0.5 to 1, by least squares", units.RATE
+        ),
+        "linear_growth_rate": Quantity(
+            "growth rate of linear theory over the same times", units.RATE
+        ),
+        "growth_ratio": Quantity("growth_rate over linear_growth_rate"),
     }
 
     name: Literal["kelvin_helmholtz_smooth"] = "kelvin_helmholtz_smooth"

@@ -13,6 +13,7 @@ from pydantic import Field, model_validator
 from sph import registry
 from sph.parts.external.point_mass import PointMass
 from sph.problems import base
+from sph.quantity import Quantity
 
 _SHARED = base.Problem.model_fields
 
@@ -38,6 +39,19 @@ class Problem(base.Problem):
     limits: ClassVar = {
         "energy_drift": base.Limit(
             1e-3, "circular orbits, on which kinetic and potential energy are constant"
+        ),
+    }
+    quantities: ClassVar = {
+        "density_deviation": Quantity(
+            "root mean square of rho/rho_0 - 1, without the edges of the ring"
+        ),
+        "radial_deviation": Quantity(
+            "root mean square of r - r_0 over the width of the ring, without its edges"
+        ),
+        "orbits": Quantity("length of the run in periods of the middle of the ring"),
+        "orbits_intact": Quantity(
+            "first time at which a deviation exceeds its bound, or the length of the run, in "
+            "periods of the middle of the ring"
         ),
     }
 

@@ -9,9 +9,11 @@ from typing import Annotated, ClassVar, Literal
 import numpy as np
 from pydantic import Field, model_validator
 
+from sph import quantity as units
 from sph.exact import noh
 from sph.problems import base
 from sph.problems.support import lattice as placement
+from sph.quantity import Quantity
 
 _SHARED = base.Problem.model_fields
 
@@ -45,6 +47,35 @@ class Problem(base.Problem):
         ),
         "planar_norm_pressure": base.Limit(0.006, "an independent implementation gives 0.0052"),
         "planar_norm_velocity": base.Limit(0.008, "an independent implementation gives 0.0070"),
+    }
+    quantities: ClassVar = {
+        "plateau_density_exact": Quantity("exact density behind the shock", units.DENSITY),
+        "plateau_density_error": Quantity(
+            "median density from 0.3 to 0.8 of the radius of the shock over exact, minus 1"
+        ),
+        "plateau_pressure_error": Quantity(
+            "median pressure from 0.3 to 0.8 of the radius of the shock over exact, minus 1"
+        ),
+        "central_density_error": Quantity(
+            "density of the particle nearest to the origin over exact, minus 1 (wall heating)"
+        ),
+        "shock_radius": Quantity(
+            "largest radius of a particle denser than the middle of the jump at the shock",
+            units.LENGTH,
+        ),
+        "shock_radius_exact": Quantity("exact radius of the shock", units.LENGTH),
+        "planar_norm_density": Quantity(
+            "sum of dx |error of rho| over 0.05 < x < 0.35, with dx = m/rho; 1-D only",
+            "mass length^(1-D)",
+        ),
+        "planar_norm_pressure": Quantity(
+            "sum of dx |error of P| over 0.05 < x < 0.35, with dx = m/rho; 1-D only",
+            "mass length^(3-D) time^-2",
+        ),
+        "planar_norm_velocity": Quantity(
+            "sum of dx |error of v| over 0.05 < x < 0.35, with dx = m/rho; 1-D only",
+            "length^2 time^-1",
+        ),
     }
 
     name: Literal["noh"] = "noh"

@@ -11,10 +11,12 @@ from typing import Annotated, ClassVar, Literal
 import numpy as np
 from pydantic import Field, PrivateAttr, model_validator
 
+from sph import quantity as units
 from sph.exact import plate
 from sph.problems import base
 from sph.problems.support import lattice as placement
 from sph.problems.support import oscillation, solids
+from sph.quantity import Quantity
 
 _SHARED = base.Problem.model_fields
 
@@ -45,6 +47,19 @@ class Problem(base.Problem):
         "damping": base.Limit(0.12, "measured: 0.073 a period, by viscosity"),
     }
     profiled: ClassVar = False
+    quantities: ClassVar = {
+        "tip_displacement": Quantity(
+            "mean of y over the last column of particles of the plate", units.LENGTH
+        ),
+        "period": Quantity("period of the oscillation, by least squares", units.TIME),
+        "period_exact": Quantity("period of linear elasticity with jaws", units.TIME),
+        "period_error": Quantity("relative error, absolute: period over period_exact, minus 1"),
+        "thin_plate_period": Quantity(
+            "period of thin plates clamped at x = 0, in theory", units.TIME
+        ),
+        "damping": Quantity("part of the amplitude that is lost in a period"),
+        "amplitude": Quantity("largest |tip_displacement|", units.LENGTH),
+    }
 
     name: Literal["oscillating_plate"] = "oscillating_plate"
     dimension: Literal[2] = Field(default=2, description="number of space dimensions")

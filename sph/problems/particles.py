@@ -5,7 +5,9 @@ from typing import Annotated, Any, ClassVar, Literal
 import numpy as np
 from pydantic import Field, model_validator
 
+from sph import quantity as units
 from sph.problems import base
+from sph.quantity import Quantity
 
 _SHARED = base.Problem.model_fields
 
@@ -24,6 +26,17 @@ class Problem(base.Problem):
     limits: ClassVar = {
         "energy_drift": base.Limit(1e-3, "error of the leapfrog in any flow"),
         "momentum_change": base.Limit(1e-12, "pair forces are equal and opposite: only round-off"),
+    }
+    quantities: ClassVar = {
+        "lowest_internal_energy": Quantity(
+            "smallest internal energy per unit mass of a particle", units.SPECIFIC_ENERGY
+        ),
+        "lowest_density": Quantity("smallest density of a particle", units.DENSITY),
+        "widest_support": Quantity("largest support radius of a particle", units.LENGTH),
+        "centre_error": Quantity(
+            "distance of the centre of mass from its free motion, over the extent of the particles "
+            "plus the distance that the fastest particle travels"
+        ),
     }
 
     name: Literal["particles"] = "particles"

@@ -6,10 +6,12 @@ from typing import Annotated, ClassVar, Literal
 import numpy as np
 from pydantic import Field, field_validator
 
+from sph import quantity as units
 from sph.errors import ConfigError
 from sph.exact import sedov
 from sph.problems import base
 from sph.problems.support import lattice as placement
+from sph.quantity import Quantity
 
 _SHARED = base.Problem.model_fields
 
@@ -37,6 +39,19 @@ class Problem(base.Problem):
             0.03,
             "measured: 2.7 % at 32^3 and alpha = 3, with a shock a quarter of the radius wide; "
             "0.7 % at 64^3; 0.15 % at 32^3 and alpha = 1.5",
+        ),
+    }
+    quantities: ClassVar = {
+        "peak_density": Quantity("largest density of a particle", units.DENSITY),
+        "peak_density_exact": Quantity("exact density behind the shock", units.DENSITY),
+        "peak_radius": Quantity(
+            "distance of the densest particle from the explosion", units.LENGTH
+        ),
+        "peak_radius_exact": Quantity("exact radius of the shock", units.LENGTH),
+        "momentum_radius": Quantity("sum of m v_r r over the sum of m v_r", units.LENGTH),
+        "momentum_radius_exact": Quantity("exact value of momentum_radius", units.LENGTH),
+        "momentum_radius_error": Quantity(
+            "relative error, absolute: momentum_radius over momentum_radius_exact, minus 1"
         ),
     }
 

@@ -13,10 +13,12 @@ import numpy as np
 from pydantic import Field, PrivateAttr, model_validator
 
 from sph import kernels, registry
+from sph import quantity as units
 from sph.exact import lane_emden
 from sph.problems import base
 from sph.problems.support import densities, oscillation
 from sph.problems.support import lattice as placement
+from sph.quantity import Quantity, compared
 
 _SHARED = base.Problem.model_fields
 
@@ -42,6 +44,31 @@ class Problem(base.Problem):
         "energy_drift": base.Limit(1e-3, "an equilibrium, or a pulsation over many steps"),
         "central_density_error": base.Limit(
             0.05, "kernels blur the centre: 4 % with 4000 particles, 2 % with 10,000"
+        ),
+    }
+    quantities: ClassVar = {
+        "mode_velocity": Quantity(
+            "radial velocity of the surface in the fundamental mode, over the escape speed"
+        ),
+        "outer_radius": Quantity(
+            "distance of the outermost particle from the centre of mass", units.LENGTH
+        ),
+        "virial_ratio": Quantity(
+            "2 K + 3 sum of m P/rho over the exact -W of the star; 1 in equilibrium"
+        ),
+        "mode_damping": Quantity(
+            "rate at which the amplitude of the mode falls, over its angular frequency"
+        ),
+        **compared(
+            {
+                "central_density": Quantity(
+                    "mean density of the innermost particles", units.DENSITY
+                ),
+                "half_mass_radius": Quantity(
+                    "median distance of particles from the centre of mass", units.LENGTH
+                ),
+                "mode_period": Quantity("period of the fundamental mode", units.TIME),
+            }
         ),
     }
 

@@ -11,10 +11,12 @@ from typing import Annotated, ClassVar, Literal
 import numpy as np
 from pydantic import Field
 
+from sph import quantity as units
 from sph.exact import rayleigh_taylor as linear
 from sph.problems import base
 from sph.problems.base import only
 from sph.problems.support.lattice import fill
+from sph.quantity import Quantity
 
 _SHARED = base.Problem.model_fields
 
@@ -56,6 +58,22 @@ class Problem(base.Problem):
     }
     swamped: ClassVar = {
         "growth_ratio": base.Limit(0.25, "a quarter of the linear growth rate", at_least=True)
+    }
+    quantities: ClassVar = {
+        "mode_amplitude": Quantity(
+            "amplitude of cos(kx) in the velocity along y at the interface", units.VELOCITY
+        ),
+        "mach_number": Quantity("largest ratio of velocity to local speed of sound"),
+        "growth_rate": Quantity(
+            "growth rate of mode_amplitude from t = 1 to 2, by least squares", units.RATE
+        ),
+        "linear_growth_rate": Quantity(
+            "growth rate of linear theory over the same times", units.RATE
+        ),
+        "growth_ratio": Quantity("growth_rate over linear_growth_rate"),
+        "mode_growth_rate": Quantity(
+            "growth rate of the growing mode alone, in linear theory", units.RATE
+        ),
     }
 
     name: Literal["rayleigh_taylor"] = "rayleigh_taylor"

@@ -10,11 +10,13 @@ from typing import Annotated, ClassVar, Literal
 import numpy as np
 from pydantic import Field, PrivateAttr, model_validator
 
+from sph import quantity as units
 from sph.exact.plate import Material
 from sph.exact.rotating_disc import Disc
 from sph.problems import base
 from sph.problems.support import lattice as placement
 from sph.problems.support import solids
+from sph.quantity import Quantity
 
 _SHARED = base.Problem.model_fields
 
@@ -44,6 +46,28 @@ class Problem(base.Problem):
         "stress_error": base.Limit(0.05, "measured: 0.027; kernels at the rim"),
     }
     radial: ClassVar = True
+    quantities: ClassVar = {
+        "angular_momentum": Quantity(
+            "angular momentum about the centre of mass", units.ANGULAR_MOMENTUM
+        ),
+        "rms_radius": Quantity("root mean square radius over its value at rest"),
+        "turns": Quantity("rotations since the start"),
+        "angular_momentum_drift": Quantity(
+            "relative change of the angular momentum since the start, absolute, per turn"
+        ),
+        "radius_change": Quantity("relative change of rms_radius since the start"),
+        "largest_radius_change": Quantity(
+            "largest absolute value of the relative change of rms_radius at any step"
+        ),
+        "angle_error": Quantity("angle by which the disc is ahead of the exact rotation, in turns"),
+        "shape_error": Quantity(
+            "root mean square distance of particles from their initial positions, turned by the "
+            "angle of best fit, over the radius"
+        ),
+        "stress_error": Quantity(
+            "mean size of the error of the stress over the largest stress, without the rim"
+        ),
+    }
 
     name: Literal["rotating_disc"] = "rotating_disc"
     dimension: Literal[2] = Field(default=2, description="number of space dimensions")

@@ -12,8 +12,10 @@ from typing import Annotated, ClassVar, Literal
 import numpy as np
 from pydantic import Field, PrivateAttr, model_validator
 
+from sph import quantity as units
 from sph.problems import base
 from sph.problems.support import bodies, solids
+from sph.quantity import Quantity
 
 _SHARED = base.Problem.model_fields
 
@@ -47,6 +49,24 @@ class Problem(base.Problem):
         ),
     }
     profiled: ClassVar = False
+    quantities: ClassVar = {
+        "ring_gap": Quantity(
+            "shortest distance between particles of the two rings, less one spacing", units.LENGTH
+        ),
+        "approach": Quantity(
+            "relative velocity of the centres of mass over that at t = 0; negative after the "
+            "rebound"
+        ),
+        "angular_momentum": Quantity(
+            "angular momentum about the centre of mass over the sum of m |x| |v| of the two rings "
+            "as points at t = 0"
+        ),
+        "angular_momentum_change": Quantity("largest |change of angular_momentum since the start|"),
+        "rebound_time": Quantity("time at which the rings separate again", units.TIME),
+        "restitution": Quantity(
+            "relative velocity of the centres of mass after the rebound over that before, eq 457"
+        ),
+    }
 
     name: Literal["rubber_rings"] = "rubber_rings"
     dimension: Literal[2] = Field(default=2, description="number of space dimensions")

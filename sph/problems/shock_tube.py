@@ -10,11 +10,13 @@ from typing import Annotated, Any, ClassVar, Literal, NamedTuple
 import numpy as np
 from pydantic import Field, field_validator, model_validator
 
+from sph import quantity as units
 from sph.eos import is_gamma_law
 from sph.exact import riemann
 from sph.problems import base
 from sph.problems.support import boundary_waves, tube_figures
 from sph.problems.support import lattice as placement
+from sph.quantity import Quantity
 
 _SHARED = base.Problem.model_fields
 
@@ -54,6 +56,12 @@ class Problem(base.Problem):
     }
     limits: ClassVar = {
         "energy_drift": base.Limit(1e-4, "an independent implementation has 1e-5 at C = 0.15")
+    }
+    quantities: ClassVar = {
+        "peak_density": Quantity(
+            "largest density of a particle in the region of the errors", units.DENSITY
+        ),
+        **tube_figures.QUANTITIES,
     }
 
     name: Literal["shock_tube"] = "shock_tube"

@@ -14,9 +14,11 @@ from typing import Annotated, ClassVar, Literal
 import numpy as np
 from pydantic import Field, model_validator
 
+from sph import quantity as units
 from sph.eos import is_gamma_law
 from sph.exact import finite_volume
 from sph.problems import base
+from sph.quantity import Quantity
 
 _SHARED = base.Problem.model_fields
 
@@ -45,6 +47,15 @@ class Problem(base.Problem):
         "energy_drift": base.Limit(
             1e-4, "a shock of moderate strength, as in the shock tubes, which have 1e-5"
         )
+    }
+    quantities: ClassVar = {
+        "shock_position": Quantity("largest x of a particle denser than 2", units.LENGTH),
+        "wave_density": Quantity(
+            "root mean square of the density about its mean, from 1.9 to 0.1 behind the shock, "
+            "volume-weighted",
+            units.DENSITY,
+        ),
+        "peak_density": Quantity("largest density from 1.9 to 0.1 behind the shock", units.DENSITY),
     }
 
     name: Literal["shu_osher"] = "shu_osher"

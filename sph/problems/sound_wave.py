@@ -20,6 +20,7 @@ from pydantic import Field, field_validator
 
 from sph.problems import base
 from sph.problems.support import lattice as placement
+from sph.quantity import Quantity
 
 _SHARED = base.Problem.model_fields
 
@@ -47,6 +48,20 @@ class Problem(base.Problem):
 
     swamped: ClassVar = {
         "error_velocity_relative": base.Limit(0.5, "half of the wave's amplitude"),
+    }
+    quantities: ClassVar = {
+        "error_velocity_relative": Quantity(
+            "volume-weighted mean |error of v| over the amplitude of the wave"
+        ),
+        "error_density_relative": Quantity(
+            "volume-weighted mean |error of rho over its mean| over the amplitude of the wave"
+        ),
+        "wave_amplitude_error": Quantity(
+            "amplitude of the Fourier component of the velocity over exact, minus 1"
+        ),
+        "phase_speed_error": Quantity(
+            "mean phase speed of this component since t = 0 over exact, minus 1"
+        ),
     }
 
     name: Literal["sound_wave"] = "sound_wave"

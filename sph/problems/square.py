@@ -12,6 +12,7 @@ from pydantic import Field
 from sph.problems import base
 from sph.problems.base import only
 from sph.problems.support.lattice import grid
+from sph.quantity import Quantity
 
 _SHARED = base.Problem.model_fields
 
@@ -34,6 +35,15 @@ class Problem(base.Problem):
         "energy_drift": base.Limit(
             1e-4, "nearly at rest: kinetic energy stays below about 1e-3 of the total"
         )
+    }
+    quantities: ClassVar = {
+        "squareness": Quantity(
+            "sum of r^4 cos 4 phi over the sum of r^4 of the dense particles, relative to a "
+            "square: 1 for a square, 0 for a disc, negative for a diamond"
+        ),
+        "dense_outside": Quantity(
+            "fraction of the dense particles outside the initial square; 0.09 for a disc"
+        ),
     }
 
     name: Literal["square"] = "square"

@@ -15,6 +15,7 @@ from pydantic import Field, PrivateAttr, model_validator
 
 from sph.problems import base
 from sph.problems.support import bodies, solids
+from sph.quantity import Quantity
 
 # Finite elements of the same posed problem: final length and largest radius over the initial ones,
 # by dimension (2-D: plane strain, half width).
@@ -43,6 +44,22 @@ class Problem(base.Problem):
         "radius_error": base.Limit(0.08, "4 % thinner than finite elements was measured"),
     }
     profiled: ClassVar = False
+    quantities: ClassVar = {
+        "length_ratio": Quantity("length of the bar over its initial length"),
+        "radius_ratio": Quantity("largest radius of the bar over its initial radius"),
+        "peak_plastic_strain": Quantity("largest equivalent plastic strain of a particle"),
+        "shortest_length_ratio": Quantity("smallest length_ratio at any step"),
+        "largest_radius_ratio": Quantity("largest radius_ratio at any step"),
+        "length_error": Quantity(
+            "relative error of shortest_length_ratio against finite elements, absolute"
+        ),
+        "radius_error": Quantity(
+            "relative error of largest_radius_ratio against finite elements, absolute"
+        ),
+        "fitted_length_ratio": Quantity(
+            "length ratio of the fit of Wilkins & Guinan (1973) to measurements, eq 458"
+        ),
+    }
 
     name: Literal["taylor_bar"] = "taylor_bar"
     dimension: Literal[2, 3] = Field(default=3, description="number of space dimensions")

@@ -10,6 +10,7 @@ from sph.exact import riemann
 from sph.problems import base
 from sph.problems.support import boundary_waves
 from sph.problems.support import lattice as placement
+from sph.quantity import Quantity
 
 _SHARED = base.Problem.model_fields
 
@@ -27,6 +28,11 @@ class Problem(base.Problem):
         "energy_drift": base.Limit(
             1e-10, "forces on a lattice cancel: round-off of a few hundred steps, with a margin"
         )
+    }
+    quantities: ClassVar = {
+        "density_spread": Quantity("largest over smallest density, minus 1"),
+        "energy_spread": Quantity("largest minus smallest internal energy, over the smallest"),
+        "crossings": Quantity("distance moved along x, in lengths of the box"),
     }
 
     name: Literal["uniform"] = "uniform"

@@ -1,6 +1,7 @@
 """What a session writes down of a simulation, each number in its place; without a run."""
 
 import math
+from collections.abc import Mapping
 from contextlib import contextmanager
 from types import SimpleNamespace
 
@@ -16,6 +17,7 @@ from sph.output.history import History
 from sph.output.history import read as read_history
 from sph.output.run_directory import RunDirectory
 from sph.part import Part
+from sph.quantity import Quantity
 from sph.runner import Runner
 from sph.scene import Scene
 from sph.simulation import Simulation
@@ -148,7 +150,9 @@ def test_optional_columns_present_only_where_meaningful(session, simulation, col
 
 def test_columns_of_part_are_recorded(session, simulation):
     class Turning(Part):
-        columns = ("turning_energy", "turns")
+        columns: Mapping[str, Quantity] = {
+            name: Quantity("x") for name in ("turning_energy", "turns")
+        }
 
         def sums(self, state):
             return {"turns": float(state.mass.sum())}

@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from sph import config, declarations, parts, preview, registry, runner
+from sph import columns, config, declarations, parts, preview, registry, runner
 from sph.cli import main
 from sph.clock import Clock
 from sph.config import choices, physics
 from sph.declarations import parts as declared
 from sph.errors import ConfigError, DeclarationError, NumericalError
-from sph.output import checkpoint, history, stored
+from sph.output import checkpoint, stored
 from sph.scene import Scene
 from sph.simulation import Simulation
 from sph.state import State
@@ -50,7 +50,10 @@ PART = '''
 """A part."""
 from sph.integrators.leapfrog import STRAIGHT
 from sph.part import Evolved, Key, Part, Pass
+from sph.quantity import Quantity
 from sph.state import Field, Public
+
+def one(column): return {column: Quantity("help")}
 
 class Mine(Part):
     """A part."""
@@ -220,9 +223,11 @@ BROKEN_PARTS = {
     "a need": (with_body('needs = ("vorticity",)'), "needs: 'vorticity' is not a field"),
     "a term": (with_body('terms = {"magic": None}'), "'magic': .*Gas calls one of viscosity"),
     "the viscosity": (with_body('terms = {"viscosity": None}'), "'viscosity' is that of"),
-    "a column of every history": (with_body('columns = ("t",)'), "column 't': expected a name"),
-    "a column with a comma": (with_body('columns = ("a,b",)'), "column 'a,b': expected a name"),
-    "columns as a text": (with_body('columns = "abc"'), "a comma is missing"),
+    "a column of every history": (with_body('columns = one("t")'), "column 't': expected a name"),
+    "a column with a comma": (with_body('columns = one("a,b")'), "column 'a,b': expected a name"),
+    "columns as a text": (with_body('columns = "abc"'), "expected names with quantities"),
+    "a column without meaning": (with_body('columns = {"a": Quantity("")}'), "'a' has no meaning"),
+    "a column without a quantity": (with_body('columns = {"a": "x"}'), "'a' has no meaning"),
     "no description": (with_body("def described(self): return 'x'"), "expected a pair of lists"),
     "an issue of no key": (
         with_body("@classmethod\ndef issues(cls, physics, problem): return [('b', 'text')]"),
@@ -265,7 +270,7 @@ def test_a_field_of_another_part_cannot_be_declared_even_where_its_owner_is_left
 
 
 def test_two_parts_cannot_share_a_field_or_a_column(extension):
-    for what in ('fields = (Field("a"),)', 'columns = ("a",)'):
+    for what in ('fields = (Field("a"),)', 'columns = one("a")'):
         extension("parts/other/__init__.py", with_body(what).replace("mine", "other"))
         extension(PART_FILE, with_body(what))
         with pytest.raises(DeclarationError, match=r"'a' is declared by .*mine\.Mine too"):
@@ -289,8 +294,7 @@ def test_what_the_parts_of_sph_declare_in_some_scenes_is_reserved():
 def test_reserved_names_are_those_of_checkpoints_and_histories():
     checkpoint = {*stored.SCALARS, *stored.ENERGIES, *stored.LISTS}
     assert checkpoint <= declared.NOT_FIELDS
-    scene = {"held_supports", "volume_ratio", "energy_added"}
-    assert {*history.columns(3), *scene} == declared.NOT_COLUMNS
+    assert {*columns.shared(3), *columns.OF_SOME} == declared.NOT_COLUMNS
     assert (stored.NAME, 1 + max(r for r, _ in stored.ENTRIES)) == (
         declared.NAME, len(declared.RANKS)
     )  # fmt: skip
@@ -308,10 +312,19 @@ def returned(extension, body):
     ("body", "message"),
     [
         ("def energies(self, s): return {'e': s.mass}", r"return \(e\), expected .*: \(\)"),
-        ("columns = ('e',)", r"return \(\), expected .*: \(e\)"),
-        ("columns = ('e',)\ndef energies(self, s): return {'e': 0.0}", r"e has the shape \(\)"),
-        ("columns = ('e',)\ndef sums(self, s): return {'e': s.mass}", "e is .*, expected a number"),
-        ("columns = ('e',)\ndef sums(self, s): return {'e': None}", "e is None, expected a number"),
+        ("columns = one('e')", r"return \(\), expected .*: \(e\)"),
+        (
+            "columns = one('e')\ndef energies(self, s): return {'e': 0.0}",
+            r"e has the shape \(\)",
+        ),
+        (
+            "columns = one('e')\ndef sums(self, s): return {'e': s.mass}",
+            "e is .*, expected a number",
+        ),
+        (
+            "columns = one('e')\ndef sums(self, s): return {'e': None}",
+            "e is None, expected a number",
+        ),
         ("def step_limit(self, s): return 0.1", r"step_limit has the shape \(\)"),
     ],
 )
@@ -333,7 +346,7 @@ def test_a_limit_on_the_step_that_is_nan_is_a_numerical_failure(extension):
 def test_a_sum_that_is_nan_is_a_numerical_failure(extension):
     """A history with it could not be read by a restart."""
     simulation = started(
-        extension, "columns = ('e',)\ndef sums(self, s): return {'e': float('nan')}"
+        extension, "columns = one('e')\ndef sums(self, s): return {'e': float('nan')}"
     )
     with pytest.raises(NumericalError, match="e is nan"):
         simulation.columns()
@@ -361,7 +374,7 @@ def test_the_command_line_exits_with_2_and_lists_files_without_a_docstring(exten
     listed = CliRunner().invoke(main, ["list"])
     assert listed.exit_code == 0
     assert "plain                    (no docstring)" in listed.output
-    extension(PART_FILE, with_body("columns = ('t',)"))
+    extension(PART_FILE, with_body("columns = one('t')"))
     scene = tmp_path / "scene.toml"
     scene.write_text(SCENE.format("mine = 1.0"))
     failed = CliRunner().invoke(main, ["run", str(scene), "-o", str(tmp_path / "run")])

@@ -88,8 +88,9 @@ def _pictures(source: Source, run: RunDirectory):
     if run.history.exists():
         steps = read_history(run.history)
         if steps["t"].size:
-            theory = truth.theory(last.checkpoint.config, steps["t"])
-            yield "history", history.figure(steps, last.title, theory)
+            config = last.checkpoint.config
+            theory = truth.theory(config, steps["t"])
+            yield "history", history.figure(steps, last.title, theory, config)
 
 
 def _check_format(target: Path) -> None:

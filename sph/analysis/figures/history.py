@@ -5,9 +5,12 @@ import itertools
 import numpy as np
 from matplotlib.figure import Figure
 
+from sph import meanings
 from sph.analysis.figures import style
+from sph.columns import shared as shared_columns
+from sph.config import Config
 from sph.integrators.step_size import CRITERIA
-from sph.output.history import columns as shared_columns
+from sph.quantity import TIME
 
 ENERGIES = (
     ("total_energy", "total", "black", "-"),
@@ -22,11 +25,15 @@ COLOURS = (*style.PALETTE, "black", "#999999", "#882255", "#44aa99", "#ddcc77")
 
 
 def figure(
-    history: dict[str, np.ndarray], title: str, theory: dict[str, np.ndarray] | None = None
+    history: dict[str, np.ndarray],
+    title: str,
+    theory: dict[str, np.ndarray] | None = None,
+    config: Config | None = None,
 ) -> Figure:
     """Energies, their drift, momentum, steps by what limited them, and the problem's diagnostics.
 
-    `history` is that of `sph.output.history.read`; `theory` has what is said of its columns.
+    `history` is that of `sph.output.history.read`; `theory` has what is said of its columns;
+    `config`, that of the run, has its units.
     """
     theory = theory or {}
     momentum = [name for name in history if name.startswith("momentum_")]
@@ -39,12 +46,23 @@ def figure(
     _steps(panels[3], history)
     for panel, name in zip(panels[4:], further, strict=True):
         _diagnostic(panel, history, name, theory.get(name))
+    if config is not None and config.units.are_given:
+        _add_units(panels, further, config)
     for panel in panels:
         if panel.get_subplotspec().is_last_row():
-            panel.set_xlabel("$t$")
+            panel.set_xlabel(style.labelled("$t$", TIME, config.units) if config else "$t$")
         panel.margins(x=0.02)
     picture.suptitle(title)
     return picture
+
+
+def _add_units(panels, further: list[str], config: Config) -> None:
+    """Add its unit to the vertical axis of each panel. further: columns of those after four."""
+    columns = ("total_energy", "energy_drift", "momentum_x", "dt", *further)
+    for panel, name in zip(panels, columns, strict=True):
+        known = meanings.of_column(config, name)
+        if known is not None:
+            panel.set_ylabel(style.labelled(panel.get_ylabel(), known.unit, config.units))
 
 
 def _panels(count: int):

@@ -32,8 +32,9 @@ def single(state: State) -> Figure:
         image = _show(panel, values, plane, name, style.scale(values))
         figure.colorbar(image, ax=panel, pad=0.02, extend=_extends(image))
         _outline(panel, state, plane)
-        panel.set_title(f"{style.TITLES.get(name, name)} {style.SYMBOLS[name]}")
-    _label_axes(panels, 2)
+        symbol = state.labelled(style.SYMBOLS[name], name)
+        panel.set_title(f"{style.TITLES.get(name, name)} {symbol}")
+    _label_axes(panels, 2, _axes(state))
     figure.suptitle(f"{state.title}, {state.when}{_where(plane)}")
     return figure
 
@@ -93,12 +94,15 @@ class _Map(NamedTuple):
     plane: Plane
     label: str
     what: str  # for the title
+    symbol: str  # of the field, with its unit
+    axes: list[str]  # their labels
 
 
 def _drawn(state: State, label: str, what: str) -> _Map:
     plane, field = plane_of(state, PIXELS_OF_MANY), main_field(state)
     (values,) = _images(state, [field], plane)
-    return _Map(values, field, plane, label, what + _where(plane))
+    symbol = state.labelled(style.SYMBOLS[field], field)
+    return _Map(values, field, plane, label, what + _where(plane), symbol, _axes(state))
 
 
 def _side_by_side(drawn: Sequence[_Map]) -> Figure:
@@ -113,10 +117,9 @@ def _side_by_side(drawn: Sequence[_Map]) -> Figure:
     shown, empty = np.split(panels.ravel(), [len(drawn)])
     for panel in empty:
         panel.remove()
-    _label_axes(panels, len(drawn))
+    _label_axes(panels, len(drawn), drawn[0].axes)
     bar = figure.colorbar(image, ax=list(shown), pad=0.015, aspect=30, extend=_extends(image))
-    fields = sorted({one.field for one in drawn})
-    bar.ax.set_title(", ".join(style.SYMBOLS[name] for name in fields))
+    bar.ax.set_title(", ".join(dict.fromkeys(one.symbol for one in drawn)))
     figure.suptitle("; ".join(sorted({one.what for one in drawn})))
     return figure
 
@@ -166,16 +169,20 @@ def _arrangement(plane: Plane, count: int, widest: float) -> tuple[int, float, f
     return columns, width, height
 
 
-def _label_axes(panels, count: int) -> None:
+def _axes(state: State) -> list[str]:
+    return [state.labelled(label, "x") for label in ("$x$", "$y$")]
+
+
+def _label_axes(panels, count: int, labels: Sequence[str]) -> None:
     """Numbers and names on the outer axes of the first `count` panels of a grid."""
     columns = panels.shape[1]
     for i, panel in enumerate(panels.flat[:count]):
         is_lowest = i + columns >= count
         panel.tick_params(labelbottom=is_lowest, labelleft=i % columns == 0)
         if is_lowest:
-            panel.set_xlabel("$x$")
+            panel.set_xlabel(labels[0])
         if i % columns == 0:
-            panel.set_ylabel("$y$")
+            panel.set_ylabel(labels[1])
 
 
 def _where(plane: Plane) -> str:

@@ -116,6 +116,7 @@ def _figure(states, labels, colours, title, note_errors: bool) -> Figure:
     errors = [state.errors() if note_errors else {} for state in states]
     for name, panel in panels.items():
         _set_scale(panel, profiles, name)
+        panel.set_ylabel(states[0].labelled(style.SYMBOLS[name], name))
         drawn = [
             _particles(panel, one, name, colour, alone)
             for one, colour in zip(profiles, colours, strict=True)
@@ -123,7 +124,8 @@ def _figure(states, labels, colours, title, note_errors: bool) -> Figure:
         exact = [_exact(panel, one, name, alone) for one in profiles if name in one.exact]
         _note(panel, name, drawn, errors)
     for panel in list(panels.values())[2:]:
-        panel.set_xlabel(f"${profiles[0].symbol}$")
+        symbol = profiles[0].symbol
+        panel.set_xlabel(states[0].labelled(f"${symbol}$", symbol))
     figure.suptitle(title + _without_exact(states))
     entries = [
         *zip(drawn, labels, strict=True),
@@ -137,10 +139,9 @@ def _figure(states, labels, colours, title, note_errors: bool) -> Figure:
 
 
 def _set_scale(panel, profiles: Sequence[Profile], name: str) -> None:
-    """Label and limits; logarithmic where a peak would press all the rest to the floor."""
+    """Limits; logarithmic where a peak would press all the rest to the floor."""
     values = np.concatenate([one.fields[name] for one in profiles])
     exact = np.concatenate([one.exact.get(name, values[:0]) for one in profiles])
-    panel.set_ylabel(style.SYMBOLS[name])
     panel.margins(x=0.02)
     if values.min() > 0.0 and values.max() > 100.0 * np.median(values):
         # the exact blast is infinitely hot at its centre: the particles set the limits

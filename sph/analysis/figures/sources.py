@@ -8,11 +8,13 @@ from pathlib import Path
 import numpy as np
 
 from sph.analysis import errors, truth
+from sph.analysis.figures import style
 from sph.domain import Domain
 from sph.errors import FileError
 from sph.output import checkpoint, same_run
 from sph.output.run_directory import RunDirectory, find
 from sph.problems.support import uniaxial
+from sph.quantity import FIELDS
 
 
 @dataclass(frozen=True)
@@ -150,7 +152,16 @@ class State:
 
     @property
     def when(self) -> str:
-        return f"$t$ = {self.time:.4g}"
+        return f"$t$ = {self.time:.4g} {self.units.symbol(0, 0, 1)}".rstrip()
+
+    @property
+    def units(self):
+        """The table [units]."""
+        return self.checkpoint.config.units
+
+    def labelled(self, label: str, field: str) -> str:
+        """The label of a field, or of a coordinate x or r, with its unit if the run has one."""
+        return style.labelled(label, FIELDS[field].unit, self.units)
 
     @property
     def is_solid(self) -> bool:

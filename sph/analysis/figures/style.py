@@ -13,6 +13,7 @@ from matplotlib.figure import Figure
 from PIL import Image
 
 from sph.output.files import replacing
+from sph.quantity import exponents
 
 DPI = 180
 
@@ -61,6 +62,30 @@ SETTINGS: dict[Any, Any] = {
     "pdf.fonttype": 42,  # letters stay letters, as journals ask
     "svg.fonttype": "path",
 }
+
+
+# Units that have a symbol of their own.
+UNITS = {
+    "M_sun": r"M_\odot", "R_sun": r"R_\odot", "M_earth": r"M_\oplus", "R_earth": r"R_\oplus",
+    "M_jup": r"M_{\mathrm{J}}", "um": r"\mu\mathrm{m}",
+}  # fmt: skip
+
+
+def labelled(label: str, unit: str, units) -> str:
+    """A label with its unit in brackets, if the run has physical units.
+
+    unit: as quantities state it, such as "mass length^-D"; units: the table [units].
+    """
+    powers = exponents(unit)
+    if not units.are_given or not powers or not any(powers):
+        return label
+    factors = [
+        UNITS.get(name, rf"\mathrm{{{name}}}".replace(" ", r"\ "))
+        + (f"^{{{power}}}" if power != 1 else "")
+        for name, power in units.factors(*powers)
+    ]
+    product = r"\,".join(factors)
+    return f"{label} [${product}$]"
 
 
 @contextmanager

@@ -15,7 +15,7 @@ NORMS = ("L1", "L2", "Linf")
 
 def as_text(report: Report) -> str:
     """The table with aligned columns, for a terminal."""
-    header, *lines = _cells(report)
+    header, *lines = cells(report)
     widths = [max(map(len, column)) for column in zip(header, *lines, strict=True)]
     return "\n".join(
         "  ".join(f"{cell:>{width}}" for cell, width in zip(line, widths, strict=True))
@@ -25,7 +25,7 @@ def as_text(report: Report) -> str:
 
 def as_markdown(report: Report, sentences: Sequence[str], pictures: Sequence[str]) -> str:
     """The table, the sentences, and links to the figures in the same directory."""
-    header, *lines = _cells(report)
+    header, *lines = cells(report)
     rule = ["---:"] * len(header)
     rows = ["| " + " | ".join(line) + " |" for line in (header, rule, *lines)]
     said = [f"- {sentence}" for sentence in sentences]
@@ -69,7 +69,7 @@ def as_json(report: Report, sentences: Sequence[str]) -> str:
     return json_text(content, endless=null)
 
 
-def _cells(report: Report) -> list[list[str]]:
+def cells(report: Report) -> list[list[str]]:
     """The header and the lines of the table."""
     shown = [key for key in report.keys if key != RESOLUTION]
     question = report.question

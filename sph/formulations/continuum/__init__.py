@@ -1,5 +1,6 @@
 """Fluids and solids by SPH of the continuum equations: evolved density, corrected kernel."""
 
+from collections.abc import Mapping
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
@@ -8,11 +9,16 @@ from sph.formulations import Formulation
 from sph.formulations.continuum import fields, pieces, schedule, soundness
 from sph.formulations.continuum.material import Material
 from sph.part import Key
+from sph.quantity import Quantity
 
 STRENGTH = "sph.formulations.continuum.strength"
 
 # Support radius over the smoothing length d of the equations.
 SUPPORT_RATIO = 2.0
+
+CORRECTIONS = {
+    "corrections_failed": Quantity("number of particles at which correction 1 fell back to 0")
+}
 
 
 class ContinuumModels(NamedTuple):
@@ -89,6 +95,7 @@ class Continuum(Formulation):
         "plastic_strain", "material", "clamped", "balsara", "kernel_factor", "kernel_gradient",
         "kernel_matrix", "tension", "initial_support", "body",
     )  # fmt: skip
+    columns: Mapping[str, Quantity] = CORRECTIONS
     bounds_acceleration = True  # cold matter at rest has no other bound
 
     def __init__(self, scene):
@@ -124,7 +131,7 @@ class Continuum(Formulation):
         self.fields = fields.of(self)
         self.evolved = fields.evolved(self)
         self.passes = schedule.of(self)
-        self.columns = ("corrections_failed",) if self.order == 1 else ()
+        self.columns = CORRECTIONS if self.order == 1 else {}
         # `check` only names the particle: a NaN is in the sums of the step, always checked
         self.idle = ("check",) if self.order == 1 else ("check", "sums")
 

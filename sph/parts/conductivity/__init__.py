@@ -101,8 +101,9 @@ class Conductivity(Part):
         strength = self.exchange.strength
         return (LARGEST / strength if strength else math.inf), self.name
 
-    def criterion_words(self, criterion):
-        if criterion == self.name:
+    @classmethod
+    def criterion_words(cls, criterion):
+        if criterion == cls.name:
             return "signal speed, with C reduced for the strength of physics.conductivity"
         return None
 

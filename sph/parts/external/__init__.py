@@ -12,9 +12,12 @@ configuration. Every field works with reflecting walls, because no particle is m
 place there; a periodic boundary moves particles, and so changes their potential energy.
 """
 
+from collections.abc import Mapping
+
 from sph import registry
 from sph.model import Model
 from sph.part import Key, Part, Pass
+from sph.quantity import ENERGY, Quantity
 
 FOLDER = "sph.parts.external"
 
@@ -46,7 +49,9 @@ class External(Part):
         ),
     )
     balances_pressure = True
-    columns = ("potential_energy",)
+    columns: Mapping[str, Quantity] = {
+        "potential_energy": Quantity("potential energy in the external field", ENERGY)
+    }
     keeps_momentum = False
     bounds_acceleration = True
 

@@ -14,6 +14,7 @@ where m, Q and OCT are mass, quadrupole and octupole of the nodes (`_tree`). The
 -G times pull, and the potential -G times depth. The name of the file is the value of `order`.
 """
 
+from collections.abc import Mapping
 from typing import Annotated, Literal, NamedTuple
 
 import numpy as np
@@ -23,6 +24,7 @@ from sph.compiled import verb
 from sph.formulations.gas.weighting import ByMass, ByNumber
 from sph.model import Model, Parameter
 from sph.part import Key, Part, Pass
+from sph.quantity import ENERGY, Quantity
 from sph.state import Field, Public
 from sph.threads import SMALLEST_RANGE
 
@@ -114,7 +116,9 @@ class Gravity(Part):
     formulations = ("gas",)
     reserves = ("potential", "zeta")
     balances_pressure = True
-    columns = ("gravitational_energy",)
+    columns: Mapping[str, Quantity] = {
+        "gravitational_energy": Quantity("potential energy of self-gravity", ENERGY)
+    }
     bounds_acceleration = True
     exact_pairs = False  # a node acts on particles that do not act on it
 

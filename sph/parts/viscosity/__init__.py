@@ -192,9 +192,10 @@ class Viscosity(Part):
         stable = 1.0 / (alpha + math.hypot(2.0, alpha))
         return stable, self.name if alpha > 2.0 * stable else "signal_speed"
 
-    def criterion_words(self, criterion):
+    @classmethod
+    def criterion_words(cls, criterion):
         reason = "signal speed, with C reduced for physics.alpha"
-        return reason if criterion == self.name else None
+        return reason if criterion == cls.name else None
 
     def held_words(self, criterion):
         return "physics.alpha" if criterion == self.name else None

@@ -4,12 +4,39 @@ from typing import Any
 
 import numpy as np
 
+from sph import quantity as units
 from sph.exact.solid_shocks import Front, Material
+from sph.quantity import Quantity
+from sph.quantity import compared as with_errors
 
 HUGONIOT = ("rho_0", "c_0", "slope", "gruneisen")  # what eqs 422 and 440 need of an eos
 # Plateaus are measured without a fifth at either end: there are the smeared fronts and, where the
 # plates touch, the excess of heat of the start of the run (wall heating).
 MARGIN = 0.2
+
+QUANTITIES = {
+    "shock_position": Quantity("distance of the shock from the plane of impact", units.LENGTH),
+    "precursor_position": Quantity(
+        "distance of the elastic precursor from the plane of impact", units.LENGTH
+    ),
+    **with_errors(
+        {
+            "shock_speed": Quantity("speed of the shock relative to the plate", units.VELOCITY),
+            "precursor_speed": Quantity(
+                "speed of the elastic precursor relative to the plate", units.VELOCITY
+            ),
+            "shock_stress": Quantity("median of -sigma_xx behind the shock", units.PRESSURE),
+            "shock_pressure": Quantity("median pressure behind the shock", units.PRESSURE),
+            "shock_density": Quantity("median density behind the shock", units.DENSITY),
+            "shock_internal_energy": Quantity(
+                "median internal energy per unit mass behind the shock", units.SPECIFIC_ENERGY
+            ),
+            "elastic_limit": Quantity(
+                "median of -sigma_xx between the elastic precursor and the shock", units.PRESSURE
+            ),
+        }
+    ),
+}
 
 
 def material(eos, strength: Any) -> Material | None:

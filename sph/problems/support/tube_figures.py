@@ -4,11 +4,40 @@ from typing import NamedTuple
 
 import numpy as np
 
+from sph import quantity as units
 from sph.exact import riemann
+from sph.quantity import Quantity
 
 # Shocks with a smaller jump of density, relative to the gas ahead, are ignored: states with rounded
 # digits produce weak waves.
 FAINT = 0.02
+
+
+QUANTITIES = {
+    "peak_density_exact": Quantity("largest density of the exact solution", units.DENSITY),
+    "density_L1_relative": Quantity(
+        "sum of V |error of rho| over the sum of V rho, exact, in the region of the errors"
+    ),
+    **{
+        f"plateau_{side}_{name}_error": Quantity(
+            f"median {name} on the {side} of the contact over exact, minus 1{relative}"
+        )
+        for side in ("left", "right")
+        for name, relative in (
+            ("density", ""), ("velocity", ", relative to its change by the waves"), ("pressure", "")
+        )
+    },
+    **{
+        f"shock_{side}_error": Quantity(
+            f"distance that the {side} shock has travelled relative to the gas ahead over exact, "
+            "minus 1"
+        )
+        for side in ("left", "right")
+    },
+    "contact_energy_excess": Quantity(
+        "largest internal energy between the outer waves over exact, minus 1 (wall heating)"
+    ),
+}  # fmt: skip
 
 
 class Tube(NamedTuple):

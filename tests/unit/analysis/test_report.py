@@ -453,7 +453,7 @@ def test_json_record_has_every_entry_of_run(tmp_path):
     }  # fmt: skip
     assert (second["run"], second["status"], second["reason"]) == ("b", "failed", "no")
     assert "error" not in second
-    header, line = table._cells(report)
+    header, line = table.cells(report)
     assert header[-1] == "warnings"
     assert line == ["100", "250", "5", "0.1", "2.0e-05", "front", "limit, volume"]
 

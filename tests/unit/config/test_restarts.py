@@ -49,6 +49,7 @@ REFUSED = ["physics.gamma=1.6", 'physics.eos={ name = "ideal_gas", gamma = 1.6 }
            'physics.external={ name = "point_mass", mass = 1.0 }', HEATING, RANGE,
            "problem.n=61", "problem.density=2.0", "time.stepping=individual"]  # fmt: skip
 
+UNITS = ["units.length=pc", "units.mass=M_sun", "units.time=3e13"]  # free; all or none
 
 # those of the formulation "continuum" only
 CONTINUUM_FREE = ["physics.allow_tearing=true"]
@@ -72,8 +73,16 @@ def test_every_key_has_a_class(name):
         assert restarts.class_of(section, key) in restarts.CLASSES, key
 
 
+def test_units_may_change():
+    found = changes(UNITS)
+    assert [one.rule for one in found] == ["free"] * 3
+    assert restarts.refusals(found) == []
+    assert "units" not in restarts.lineage(1, 0.1, found)
+
+
 def test_every_key_is_covered_by_these_tests():
-    tried = {override.partition("=")[0] for override in FREE + RECORDED + REFUSED + GRAVITY}
+    overrides = FREE + RECORDED + REFUSED + GRAVITY + UNITS
+    tried = {override.partition("=")[0] for override in overrides}
     keys = {f"{name}.{key}" for name, table in TABLES.items() for key in table.model_fields}
     # a change of the formulation would change the other keys too
     assert keys - {"physics.formulation", "physics.materials"} <= tried

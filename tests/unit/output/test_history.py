@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 from columns import as_columns
 
+from sph.columns import shared as columns
 from sph.errors import FileError
-from sph.output.history import History, columns, read
+from sph.output.history import History, read
 
 
 def row(history, step):

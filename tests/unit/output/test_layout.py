@@ -47,6 +47,7 @@ def test_header_describes_particles_and_box(public, make_state, dimension):
         "Scale-factor": 1,
         "Dimension": 3,
         "Flag_Entropy_ICs": 0,
+        "UnitsGiven": 0,
     }
     assert {name: header[name].item() for name in expected} == expected
     assert "Code" not in header
@@ -71,6 +72,24 @@ def test_group_attributes(public, make_state):
     assert scheme["Kernel function"] == b"wendland_c2"
     assert scheme["Kernel eta"].tolist() == [1.5]
     assert scheme["CFL parameter"].tolist() == [state.config.physics.C]
+
+
+def test_units_of_configuration_are_those_of_the_file(public, make_state):
+    state = make_state(3)
+    given = state.config.override(["units.length=m", "units.mass=kg", "units.time=ms"])
+    file = public(replace(state, config=given))
+    assert file["Header"].attrs["UnitsGiven"].item() == 1
+    for name in ("Units", "InternalCodeUnits"):
+        found = {key.split()[1]: value.item() for key, value in file[name].attrs.items()}
+        assert found == {
+            "mass": 1e3, "length": 1e2, "time": 1e-3, "current": 1.0, "temperature": 1.0
+        }  # fmt: skip
+    expected = {"Densities": 1e-3, "Velocities": 1e5, "Pressures": 1e7, "ParticleIDs": 1.0}
+    for name, factor in expected.items():
+        attributes = file["PartType0"][name].attrs
+        key = "Conversion factor to CGS (not including cosmological corrections)"
+        # round-off of the powers
+        assert attributes[key].item() == pytest.approx(factor, rel=1e-15), name
 
 
 def test_equation_of_state_stored_with_parameters(public, make_state):

@@ -7,9 +7,10 @@ import numpy as np
 import pytest
 from columns import as_columns
 
+from sph.columns import shared as columns
 from sph.errors import FileError
 from sph.output import checkpoint, files
-from sph.output.history import History, columns
+from sph.output.history import History
 from sph.output.run_directory import RunDirectory
 
 

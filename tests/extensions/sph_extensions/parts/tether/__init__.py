@@ -1,9 +1,13 @@
 """Springs that hold each particle to where it began, and the length of its path since then."""
 
+from collections.abc import Mapping
+
 import numpy as np
 
+from sph import quantity as units
 from sph.integrators.leapfrog import STRAIGHT
 from sph.part import Evolved, Key, Part, Pass
+from sph.quantity import Quantity
 from sph.state import Field, Public
 
 
@@ -21,7 +25,10 @@ class Tether(Part):
             restart="same kind",
         ),
     )
-    columns = ("tether_energy", "longest_path")
+    columns: Mapping[str, Quantity] = {
+        "tether_energy": Quantity("energy of the springs", units.ENERGY),
+        "longest_path": Quantity("length of the longest path of a particle", units.LENGTH),
+    }
     fields = (
         Field("anchor", rank=1),
         Field("path", at_least=0.0, public=Public("Paths", 1, 0, 0, 0, "Length of the path")),

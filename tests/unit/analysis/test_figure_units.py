@@ -1,0 +1,73 @@
+"""Axes of figures have the physical units of the run, if it has some."""
+
+import numpy as np
+import pytest
+from test_figures import low_resolution, state_of, write_run  # noqa: F401  (a fixture)
+
+from sph import config, quantity
+from sph.analysis.figures import history, maps, profiles, style
+from sph.output.history import read
+
+GALAXY = ("units.length=kpc", "units.mass=M_sun", "units.time=Myr")
+LENGTH = r"[$\mathrm{kpc}$]"
+DENSITY = r"[$M_\odot\,\mathrm{kpc}^{-3}$]"
+
+
+def test_profile_has_units_on_both_axes():
+    panels = profiles.single(state_of("shock_tube", *GALAXY)).axes
+    assert panels[0].get_ylabel() == rf"$\rho$ {DENSITY}"
+    assert panels[1].get_ylabel() == r"$v$ [$\mathrm{kpc}\,\mathrm{Myr}^{-1}$]"
+    assert panels[2].get_xlabel() == f"$x$ {LENGTH}"
+
+
+def test_maps_have_units_of_fields_axes_and_time():
+    states = [state_of("kelvin_helmholtz", *GALAXY, time=t) for t in (0.0, 0.5)]
+    single = maps.single(states[1])
+    assert single.axes[0].get_title().endswith(DENSITY)
+    assert single.axes[0].get_ylabel() == f"$y$ {LENGTH}"
+    assert single.get_suptitle().endswith("$t$ = 0.5 Myr")
+    several = maps.over_time(states)
+    assert several.axes[-1].get_title() == rf"$\rho$ {DENSITY}"
+    assert several.axes[0].get_ylabel() == f"$y$ {LENGTH}"
+
+
+def test_history_has_units_of_its_columns(tmp_path):
+    states = [state_of("kelvin_helmholtz", *GALAXY, time=t) for t in (0.0, 0.5)]
+    run = write_run(tmp_path / "run", states)
+    made = config.from_text(run.config.read_text())
+    panels = history.figure(read(run.history), "a run", None, made).axes
+    energy = r"[$M_\odot\,\mathrm{kpc}^{2}\,\mathrm{Myr}^{-2}$]"
+    assert panels[0].get_ylabel() == f"$E$ {energy}"
+    assert panels[1].get_ylabel() == "energy drift"
+    assert panels[3].get_ylabel() == r"$\Delta t$ [$\mathrm{Myr}$]"
+    assert panels[4].get_ylabel() == r"mode amplitude [$\mathrm{kpc}\,\mathrm{Myr}^{-1}$]"
+    assert panels[4].get_xlabel() == r"$t$ [$\mathrm{Myr}$]"
+
+
+def test_figures_without_units_have_plain_axes(tmp_path):
+    states = [state_of("kelvin_helmholtz", time=t) for t in (0.0, 0.5)]
+    found = maps.single(states[1])
+    run = write_run(tmp_path / "run", states)
+    config_of = states[0].checkpoint.config
+    found_history = history.figure(read(run.history), "a run", None, config_of)
+    for figure in (found, found_history, profiles.single(state_of("shock_tube"))):
+        texts = [
+            panel.get_xlabel() + panel.get_ylabel() + panel.get_title() for panel in figure.axes
+        ]
+        assert not any("[" in text for text in texts)
+
+
+@pytest.mark.parametrize("name", ["M_sun", "um", "R_earth", "h"])
+def test_labels_can_be_drawn(name):
+    """Matplotlib refuses wrong mathematics when a figure is drawn."""
+    length = name if name in ("um", "R_earth") else 2.5e10
+    mass = name if name == "M_sun" else "kg"
+    time = name if name == "h" else "s"
+    table = f"[units]\nlength = {length!r}\nmass = {mass!r}\ntime = {time!r}\n"
+    units = config.from_text(f'[problem]\nname = "noh"\n{table}').units
+    figure = style.new_figure(1.0, 1.0)
+    label = style.labelled("$P$", quantity.PRESSURE, units)
+    figure.text(0.0, 0.0, label)
+    figure.canvas.draw()
+    assert label.startswith("$P$ [$")
+    assert np.count_nonzero([part in label for part in ("{-1}", "{-2}")]) == 2
