@@ -42,6 +42,8 @@ def run(config: Config, directory: RunDirectory, progress) -> dict:
         progress.note("preparing the initial state")
         simulation = Simulation.of_problem(Scene(config), threads_of(config), clock)
         directory.write_config(config.to_toml())
+        if source := getattr(config.problem, "source", b""):
+            directory.write_problem(source)
         try:
             simulation.begin()
         except NumericalError as error:

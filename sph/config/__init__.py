@@ -8,8 +8,7 @@ from typing import Any
 
 from pydantic import BaseModel
 
-from sph import registry
-from sph.config import commented, reading
+from sph.config import commented, outside, reading
 from sph.config.errors import suggestion
 from sph.config.physics import Physics
 from sph.config.sections import RESOURCES, SECTIONS, Output, Report, Run, Time
@@ -43,7 +42,11 @@ class Config:
 
     def override(self, overrides: Sequence[str]) -> "Config":
         """Return a copy with the overrides `a.b=VALUE` applied. Raises ConfigError."""
-        source = reading.Source("the configuration of the run", _tables(self), {})
+        tables = _tables(self)
+        if isinstance(self.problem, outside.Outside):  # of the sources as they are now
+            for key in outside.SOURCES:
+                tables["problem"].pop(key, None)
+        source = reading.Source("the configuration of the run", tables, {})
         return _resolve(source, overrides)
 
 
@@ -52,7 +55,8 @@ def load(path: str | Path, overrides: Sequence[str] = ()) -> Config:
 
     Raises FileError if the file cannot be read, and ConfigError that lists every error in it.
     """
-    return _resolve(reading.parse(reading.read(path), str(path)), overrides)
+    directory = str(Path(path).parent)
+    return _resolve(reading.parse(reading.read(path), str(path), directory), overrides)
 
 
 def from_text(text: str, source: str = "the configuration") -> Config:
@@ -66,10 +70,14 @@ def from_text(text: str, source: str = "the configuration") -> Config:
 def template(problem: str) -> str:
     """Return commented TOML for a problem: every key with its help, bounds and default.
 
-    Raises ConfigError, which names the most similar problem, if there is no problem of that name.
+    problem: a name, or the path of a Python file, which ends in .py. Raises ConfigError, which
+    names the most similar problem, if there is no problem of that name.
     """
-    problems = registry.names("sph.problems")
-    if problem not in problems:
+    if problem.endswith(".py"):
+        default = _resolve(reading.Source(problem, {"problem": {"file": problem}}, {}), ())
+        return commented.text({name: getattr(default, name) for name in _names()})
+    if outside.problem_class(problem) is None:
+        problems = outside.names()
         raise ConfigError(f'unknown problem "{problem}"; {suggestion(problem, problems)}')
     default = from_text(f'[problem]\nname = "{problem}"\n')
     return commented.text({name: getattr(default, name) for name in _names()})
