@@ -2,17 +2,19 @@
 
 import dataclasses
 import functools
-from collections.abc import Sequence
-from pathlib import Path
+import os
+from collections.abc import Mapping, Sequence
+from pathlib import Path as FilePath
 from typing import Any
 
+import numpy as np
 from pydantic import BaseModel
 
 from sph.config import commented, outside, reading
-from sph.config.errors import suggestion
+from sph.config.errors import dotted, suggestion
 from sph.config.physics import Physics
 from sph.config.sections import RESOURCES, SECTIONS, Output, Report, Run, Time
-from sph.config.toml_text import key_text, value_text
+from sph.config.toml_text import Path, key_text, value_text
 from sph.errors import ConfigError
 from sph.problems.base import Problem
 
@@ -50,12 +52,12 @@ class Config:
         return _resolve(source, overrides)
 
 
-def load(path: str | Path, overrides: Sequence[str] = ()) -> Config:
+def load(path: str | FilePath, overrides: Sequence[str] = ()) -> Config:
     """Return the configuration in a file, with the overrides `a.b=VALUE` applied.
 
     Raises FileError if the file cannot be read, and ConfigError that lists every error in it.
     """
-    directory = str(Path(path).parent)
+    directory = str(FilePath(path).parent)
     return _resolve(reading.parse(reading.read(path), str(path), directory), overrides)
 
 
@@ -65,6 +67,50 @@ def from_text(text: str, source: str = "the configuration") -> Config:
     source: name of the text in error messages.
     """
     return _resolve(reading.parse(text, source), (), recorded=True)
+
+
+def from_tables(
+    tables: Mapping[str, Any],
+    overrides: Sequence[str] = (),
+    source: str = "the configuration",
+    problem: type[Problem] | None = None,
+) -> Config:
+    """Return the configuration of tables by name, with the overrides applied. Raises ConfigError.
+
+    Numbers and arrays of NumPy, tuples and paths are taken as well; a relative path begins at the
+    current directory. source: name of the tables in messages; problem: class of the problem, in
+    place of the one that problem.name or problem.file names.
+    """
+    found = reading.Source(source, _plain(tables), {})
+    return Config(**reading.resolve(found, overrides, SECTIONS, problem=problem))
+
+
+def as_overrides(overrides: Sequence[str] | Mapping[str, Any]) -> list[str]:
+    """Return overrides `a.b=VALUE` of a mapping {"a.b": VALUE}, or those given."""
+    if not isinstance(overrides, Mapping):
+        return [overrides] if isinstance(overrides, str) else list(overrides)
+    return [f"{key}={value_text(_plain(one, (key,)))}" for key, one in overrides.items()]
+
+
+def _plain(value: Any, path: Path = ()) -> Any:
+    """Return a value as TOML has it: with numbers of Python, lists and texts.
+
+    path: of its key, for messages. Raises ConfigError for what TOML cannot express.
+    """
+    if isinstance(value, Mapping):
+        given = {str(key): one for key, one in value.items() if one is not None}
+        return {key: _plain(one, (*path, key)) for key, one in given.items()}
+    if isinstance(value, np.ndarray | np.generic):
+        value = value.tolist()
+    if isinstance(value, list | tuple):
+        return [_plain(one, (*path, k)) for k, one in enumerate(value)]
+    if isinstance(value, os.PathLike):
+        return os.fspath(value)
+    if not isinstance(value, bool | int | float | str):
+        raise ConfigError(
+            f"{dotted(path)} = {value!r}: expected a number, a text, a list or a table"
+        )
+    return value
 
 
 def template(problem: str) -> str:

@@ -86,5 +86,6 @@ def check_physics_key(problem: type[Problem], key: str, raw: dict[str, Any]) -> 
     """Raise DeclarationError for a default of a key that no formulation has."""
     if issubclass(problem, Outside) and key not in physics.keys_of_other_formulations(raw):
         raise DeclarationError(
-            f"{problem.origin}: defaults has 'physics.{key}', which is not a key"
+            f"{problem.origin}: defaults has 'physics.{key}', which is not a key; "
+            f"{suggestion(key, physics.chosen(raw).model_fields)}"
         )

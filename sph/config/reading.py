@@ -161,11 +161,13 @@ def resolve(
     overrides: Sequence[str],
     sections: dict[str, type[Section]],
     recorded: bool = False,
+    problem: type[Problem] | None = None,
 ) -> dict[str, Any]:
     """Return the validated tables by name. Raises ConfigError with one line for each error.
 
     recorded: the source is the configuration of an existing run. Such a run stays readable even if
-    a new run with its settings would be refused.
+    a new run with its settings would be refused. problem: class of the problem, if not chosen by
+    [problem].
     """
     for override in overrides:
         _set(source, override)
@@ -174,9 +176,10 @@ def resolve(
     }  # fmt: skip
     raw, issues = _known_tables(source.tables, models)
     issues += checks.both_given(raw)
-    is_in_file = isinstance(source.places.get(("problem", "file")), int)
-    start = source.directory if is_in_file else ""
-    problem = problem_choice.chosen(raw["problem"], start, issues, source.name if recorded else "")
+    if problem is None:
+        is_in_file = isinstance(source.places.get(("problem", "file")), int)
+        start, run = source.directory if is_in_file else "", source.name if recorded else ""
+        problem = problem_choice.chosen(raw["problem"], start, issues, run)
     if problem is not None:
         models["problem"] = problem
         raw["physics"].setdefault(

@@ -119,6 +119,11 @@ def read(path: Path) -> Checkpoint:
     return checkpoint
 
 
+def hash_of(checkpoint: Checkpoint) -> str:
+    """SHA-256 of the state of a checkpoint, whichever file it is in."""
+    return state_hash(_state(checkpoint))
+
+
 def state_hash(state: dict[str, np.ndarray]) -> str:
     """SHA-256 over names, types, shapes and bytes of `state`, whatever the order of its entries."""
     digest = hashlib.sha256()

@@ -15,11 +15,31 @@ def fault_of_state(problem, state: Any, *_, **__) -> str:
     missing = [name for name in STATE if not hasattr(state, name)]
     if missing:
         return f"a {type(state).__name__}; expected sph.problems.base.InitialState"
-    number = np.shape(state.mass)[-1:] or (0,)
     arrays = {name: getattr(state, name) for name in STATE}
-    if not number[0]:
-        return f"mass of the shape {np.shape(state.mass)}; expected (N,), with N particles"
-    return fault_of_arrays(arrays, STATE, problem.dimension, number[0])
+    shape = np.shape(state.position)
+    is_position = len(shape) == 2 and shape[0] == problem.dimension
+    number = shape[1] if is_position else np.size(state.mass)
+    if not number:
+        return f"position of the shape {shape}; expected (D, N), with N particles"
+    fault = fault_of_arrays(arrays, STATE, problem.dimension, number)
+    if not fault and not np.all(arrays["mass"] > 0):
+        fault = "masses that are not above 0"
+    return fault or _fault_outside(problem, np.asarray(arrays["position"]))
+
+
+def _fault_outside(problem, position: np.ndarray) -> str:
+    """Return the first particle outside the box along an axis that is not open, or ""."""
+    for axis, ((low, high), boundary) in enumerate(
+        zip(problem.box, problem.boundaries, strict=True)
+    ):
+        outside = np.flatnonzero((position[axis] < low) | (position[axis] > high))
+        if outside.size and boundary != "open":
+            i = outside[0]
+            return (
+                f"particle {i + 1} at {'xyz'[axis]} = {position[axis, i]:g}, outside the domain "
+                f"[{low:g}, {high:g}], which is {boundary} along that axis"
+            )
+    return ""
 
 
 def fault_of_arrays(arrays: dict, shapes: dict[str, str], dimension: int, number: int) -> str:
