@@ -27,7 +27,9 @@ class Problem(base.Problem):
     boundary: base.Boundary = Field(default="periodic", description="boundary of both axes")
     radius: float = Field(default=0.1, gt=0, lt=0.25, description="radius of each cloud")
     contrast: float = Field(default=4.0, ge=1, description="density of the clouds; 1 outside")
-    speed: float = Field(default=0.5, description="speed of each cloud; the speed of sound is 1.29")
+    speed: float = Field(
+        default=1.0, description="speed of each cloud; the speed of sound around it is 1.29"
+    )
 
     def initial(self, eos) -> base.InitialState:
         """Return particles on a lattice; masses follow the density, the pressure is 1."""

@@ -164,7 +164,7 @@ def test_restart_with_unchanged_file_says_nothing_and_continues_bit_for_bit(home
 def test_restart_with_changed_file_says_so_and_records_it(home):
     run(home, "--set", "time.end=0.01")
     old = digest_of(home / "clouds.py")
-    edited(home, 'default=0.5, description="speed', 'default=0.7, description="speed')
+    edited(home, 'default=1.0, description="speed', 'default=0.7, description="speed')
     new = digest_of(home / "clouds.py")
     at_end = sph_("restart", home / "run")  # an edited file is no setting that a step would use
     assert (at_end.exit_code, "has reached its end" in at_end.stderr) == (0, True)
@@ -175,7 +175,7 @@ def test_restart_with_changed_file_says_so_and_records_it(home):
     assert change in done.stderr
     last = checkpoints.read(home / "run" / "checkpoints" / "checkpoint_000002.h5")
     assert last.config.problem.file_sha256 == new
-    assert last.config.problem.speed == 0.5  # a key of the run, whatever the default is now
+    assert last.config.problem.speed == 1.0  # a key of the run, whatever the default is now
     assert any(change in line for line in last.lineage)
     first = checkpoints.read(home / "run" / "checkpoints" / "checkpoint_000000.h5")
     assert first.config.problem.file_sha256 == old

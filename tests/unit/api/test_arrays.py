@@ -33,7 +33,7 @@ def two_clouds(**changed):
     density = np.where(left | right, 4.0, 1.0)
     arrays = {
         "position": position,
-        "velocity": np.stack([0.5 * (1.0 * left - 1.0 * right), np.zeros(N)]),
+        "velocity": np.stack([1.0 * left - 1.0 * right, np.zeros(N)]),
         "mass": density / N,
         "internal_energy": 1.0 / ((5.0 / 3.0 - 1.0) * density),
         "box": [0.0, 1.0],
