@@ -158,8 +158,8 @@ def plot(sources, target):
 def new(problem, target):
     """Print a commented configuration for PROBLEM.
 
-    The text gives the meaning, bounds and default of each key. `sph list` names
-    the problems.
+    PROBLEM is a name, which `sph list` shows, or a Python file of your own, NAME.py.
+    The text gives the meaning, bounds and default of each key.
     """
     from sph import config as configuration
 
@@ -177,6 +177,7 @@ def new(problem, target):
 def list_choices():
     """List problems, kernels, schemes, other models and stress cases."""
     from sph import registry
+    from sph.config.outside import of_packages
     from sph.config.physics import model_folders
     from sph.stress.case import load as stress_cases
 
@@ -188,6 +189,9 @@ def list_choices():
             module = registry.load(package, name, folders)
             first, *_ = docstring(module).splitlines() or ["(no docstring)"]
             click.echo(f"  {name:24s} {first}")
+        for name, kind in of_packages().items() if package == "sph.problems" else ():
+            first, *_ = docstring(kind).splitlines() or ["(no docstring)"]
+            click.echo(f"  {name:24s} {first} ({kind.model_fields['package'].default})")
     click.echo("stress cases:")
     for case in stress_cases():
         click.echo(f"  {case.name:24s} {case.title}")

@@ -11,7 +11,13 @@ LINE_INTERVAL = 10.0
 
 
 class Messages:
-    """What every kind of progress can do: a line on stderr."""
+    """What every kind of progress can do: a line on stderr.
+
+    Of one run, `step` and `wrote` return None, or why the run is to stop. each_step: whether `step`
+    is called after each time step; otherwise, a call may follow several steps.
+    """
+
+    each_step = False
 
     def note(self, text):
         standard_streams.note(text)

@@ -10,7 +10,7 @@ from sph import config as configuration
 from sph import fingerprint
 from sph.analysis import reference, summary
 from sph.clock import Clock
-from sph.config import Config, restarts
+from sph.config import Config, outside, restarts
 from sph.config.restarts import Change
 from sph.errors import AtEnd, ConfigError, FileError, SphError
 from sph.integrators import step_size
@@ -50,6 +50,7 @@ def restart(
     config = checkpoint.config.override(overrides)
     changed = restarts.changes(checkpoint.config, config)
     _check_changes(changed, config, checkpoint)
+    _note_sources(changed, config, progress)
     in_place = directory is None or (home is not None and is_same_path(directory, home.path))
     is_closed = not (in_place and _is_last_without_summary(home, path, checkpoint.time))
     _check_steps_left(source, changed, config, checkpoint.time, is_closed)
@@ -159,7 +160,9 @@ def _check_steps_left(
     """Raise ConfigError for changed settings that no step would use, AtEnd for a completed run."""
     if any(output_times(config.time.end, config.output.interval, time)):
         return
-    settings = [str(one) for one in changed if not one.key.startswith("run.")]
+    settings = [
+        str(one) for one in changed if not one.key.startswith("run.") and not _is_source(one)
+    ]
     if settings:
         raise ConfigError(
             f"{source} has reached its end, t = {time:g}: no step would be computed with "
@@ -167,6 +170,23 @@ def _check_steps_left(
         )
     if is_closed:
         raise AtEnd(f"{source} has reached its end, t = {time:g}. Try: a later time.end.")
+
+
+def _is_source(change: Change) -> bool:
+    """Whether a change is one of the sources of a problem from outside, not of a setting."""
+    table, _, key = change.key.partition(".")
+    return table == "problem" and key in outside.SOURCES
+
+
+def _note_sources(changed: list[Change], config: Config, progress) -> None:
+    """Note that the file, or the package, of the problem has changed since the checkpoint."""
+    for one in filter(_is_source, changed):
+        what = getattr(config.problem, "file", "the package of the problem")
+        progress.note(
+            f"{what} has changed since the checkpoint was written: {one}. The run continues from "
+            "the state in the checkpoint; exact solution, diagnostics and figures are those of the "
+            "changed problem"
+        )
 
 
 def _is_last_without_summary(home: RunDirectory | None, path: Path, time: float) -> bool:
@@ -228,6 +248,7 @@ def _place_to_go_on(
     for earlier in home.checkpoints():
         if checkpoint_number(earlier) <= number:
             copy_file(earlier, target.checkpoint_path(checkpoint_number(earlier)))
-    if home.history.exists():
-        copy_file(home.history, target.history)
+    for path in (home.history, home.problem):
+        if path.exists():
+            copy_file(path, target.path / path.name)
     return target, number

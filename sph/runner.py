@@ -34,14 +34,15 @@ SAME_TIME = 1e-9
 def run(config: Config, directory: RunDirectory, progress) -> dict:
     """Run `config` from its initial state in an empty run directory. Return the summary.
 
-    progress: an object with note(text), start(time, end), step(simulation), wrote(path, simulation)
-    and close(). Raises NumericalError and Stopped, after the files of the run are written, and
-    FileError.
+    progress: see `sph.progress.Messages` and `Lines`. Raises NumericalError and Stopped, after the
+    files of the run are written, and FileError.
     """
     with session(directory, config, progress) as (stopped_by, clock):
         progress.note("preparing the initial state")
         simulation = Simulation.of_problem(Scene(config), threads_of(config), clock)
         directory.write_config(config.to_toml())
+        if source := getattr(config.problem, "source", b""):
+            directory.write_problem(source)
         try:
             simulation.begin()
         except NumericalError as error:
@@ -187,7 +188,7 @@ class Runner:
         if held := faults.held_courant(simulation.scene):
             self.progress.note(held)
         # diagnostics are those of each step
-        most = 1 if self.config.problem.has_diagnostics else MOST
+        most = 1 if self.config.problem.has_diagnostics or self.progress.each_step else MOST
         self.progress.start(simulation.time, end)
         try:
             for output in times:
@@ -197,11 +198,16 @@ class Runner:
                     simulation.proceed(output, most)
                     if self.config.problem.has_diagnostics:
                         self._record()
-                    self.progress.step(simulation)
+                    self._heed(self.progress.step(simulation))
                 self._write_checkpoint()
         except NumericalError as error:
             raise self._failed(error) from error
         return self._close("done")
+
+    def _heed(self, reason: str | None) -> None:
+        """Stop before the next step if there is a reason."""
+        if reason:
+            self.stopped_by.append(reason)
 
     def _failed(self, error: NumericalError) -> NumericalError:
         """Return the error with a table of neighbours and the checkpoint to restart from."""
@@ -254,7 +260,7 @@ class Runner:
             checkpoints.write(path, self._checkpoint())
         self.number += 1
         self.saved_step = simulation.step
-        self.progress.wrote(path, simulation)
+        self._heed(self.progress.wrote(path, simulation))
 
     def _checkpoint(self) -> Checkpoint:
         return state_of(self.simulation, self.lineage)

@@ -168,7 +168,7 @@ class Scene:
         try:
             with np.errstate(all="ignore"):
                 found = problem.initial(self.eos)
-                return self._with_density(found) if self._evolves("density") else found
+                return self._with_density(found) if self.evolves("density") else found
         except (ArithmeticError, ValueError) as error:
             raise ConfigError(
                 f"problem.name = {problem.name}: particles cannot be placed with these settings "
@@ -176,7 +176,8 @@ class Scene:
                 "of similar length."
             ) from error
 
-    def _evolves(self, name: str) -> bool:
+    def evolves(self, name: str) -> bool:
+        """Return whether a part integrates the field of that name in time."""
         return any(one.value == name for part in self.all_parts for one in part.evolved)
 
     def _with_density(self, start: InitialState) -> InitialState:

@@ -2,6 +2,7 @@
 
 import os
 import signal
+import threading
 from contextlib import contextmanager, suppress
 
 NUMBERS = (signal.SIGINT, signal.SIGTERM)
@@ -41,9 +42,13 @@ def stop_signals(second=None):
     """Yield a list to which the name of the first SIGINT or SIGTERM is added.
 
     second: handler of later signals, for users who do not wait for the end of the step. If None,
-    later signals are handled as before.
+    later signals are handled as before. Only the main thread can receive signals: elsewhere the
+    list stays empty.
     """
     received: list[str] = []
+    if threading.current_thread() is not threading.main_thread():
+        yield received
+        return
 
     def note(number, _frame):
         received.append(name(number))

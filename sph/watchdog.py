@@ -55,7 +55,7 @@ class Watchdog:
             for axis in open_axes
             for lo, hi in [box[axis]]
         ]
-        self._end = scene.config.time.end
+        self.end = scene.config.time.end  # of the run, which `check_pace` looks ahead to
         self._marked = None  # (time, step) at which the present window began
         self._longest = 0.0  # time covered by the best window
 
@@ -66,8 +66,8 @@ class Watchdog:
             if not 1.0 / LARGEST < length < LARGEST:
                 what = f"the length of the domain along {axis} is {length:g}"
                 raise fault(simulation, what, NEARER_UNITS, 0)
-        if not 1.0 / LARGEST < self._end < LARGEST:
-            raise fault(simulation, f"time.end is {self._end:g}", NEARER_UNITS, 0)
+        if not 1.0 / LARGEST < self.end < LARGEST:
+            raise fault(simulation, f"time.end is {self.end:g}", NEARER_UNITS, 0)
         p = simulation.particles
         for name, values, smallest in (
             ("mass", p.mass, 1.0 / LARGEST),
@@ -194,7 +194,7 @@ class Watchdog:
                 longer_steps(simulation),
                 simulation.limit.particle,
             )
-        left = self._end - simulation.time
+        left = self.end - simulation.time
         if covered * MOST_WINDOWS < left:
             raise fault(
                 simulation,

@@ -2,18 +2,19 @@
 
 import dataclasses
 import functools
-from collections.abc import Sequence
-from pathlib import Path
+import os
+from collections.abc import Mapping, Sequence
+from pathlib import Path as FilePath
 from typing import Any
 
+import numpy as np
 from pydantic import BaseModel
 
-from sph import registry
-from sph.config import commented, reading
-from sph.config.errors import suggestion
+from sph.config import commented, outside, reading
+from sph.config.errors import dotted, suggestion
 from sph.config.physics import Physics
 from sph.config.sections import RESOURCES, SECTIONS, Output, Report, Run, Time
-from sph.config.toml_text import key_text, value_text
+from sph.config.toml_text import Path, key_text, value_text
 from sph.config.units import Units
 from sph.errors import ConfigError
 from sph.problems.base import Problem
@@ -45,16 +46,21 @@ class Config:
 
     def override(self, overrides: Sequence[str]) -> "Config":
         """Return a copy with the overrides `a.b=VALUE` applied. Raises ConfigError."""
-        source = reading.Source("the configuration of the run", _tables(self), {})
+        tables = _tables(self)
+        if isinstance(self.problem, outside.Outside):  # of the sources as they are now
+            for key in outside.SOURCES:
+                tables["problem"].pop(key, None)
+        source = reading.Source("the configuration of the run", tables, {})
         return _resolve(source, overrides)
 
 
-def load(path: str | Path, overrides: Sequence[str] = ()) -> Config:
+def load(path: str | FilePath, overrides: Sequence[str] = ()) -> Config:
     """Return the configuration in a file, with the overrides `a.b=VALUE` applied.
 
     Raises FileError if the file cannot be read, and ConfigError that lists every error in it.
     """
-    return _resolve(reading.parse(reading.read(path), str(path)), overrides)
+    directory = str(FilePath(path).parent)
+    return _resolve(reading.parse(reading.read(path), str(path), directory), overrides)
 
 
 def from_text(text: str, source: str = "the configuration") -> Config:
@@ -65,13 +71,61 @@ def from_text(text: str, source: str = "the configuration") -> Config:
     return _resolve(reading.parse(text, source), (), recorded=True)
 
 
+def from_tables(
+    tables: Mapping[str, Any],
+    overrides: Sequence[str] = (),
+    source: str = "the configuration",
+    problem: type[Problem] | None = None,
+) -> Config:
+    """Return the configuration of tables by name, with the overrides applied. Raises ConfigError.
+
+    Numbers and arrays of NumPy, tuples and paths are taken as well; a relative path begins at the
+    current directory. source: name of the tables in messages; problem: class of the problem, in
+    place of the one that problem.name or problem.file names.
+    """
+    found = reading.Source(source, _plain(tables), {})
+    return Config(**reading.resolve(found, overrides, SECTIONS, problem=problem))
+
+
+def as_overrides(overrides: Sequence[str] | Mapping[str, Any]) -> list[str]:
+    """Return overrides `a.b=VALUE` of a mapping {"a.b": VALUE}, or those given."""
+    if not isinstance(overrides, Mapping):
+        return [overrides] if isinstance(overrides, str) else list(overrides)
+    return [f"{key}={value_text(_plain(one, (key,)))}" for key, one in overrides.items()]
+
+
+def _plain(value: Any, path: Path = ()) -> Any:
+    """Return a value as TOML has it: with numbers of Python, lists and texts.
+
+    path: of its key, for messages. Raises ConfigError for what TOML cannot express.
+    """
+    if isinstance(value, Mapping):
+        given = {str(key): one for key, one in value.items() if one is not None}
+        return {key: _plain(one, (*path, key)) for key, one in given.items()}
+    if isinstance(value, np.ndarray | np.generic):
+        value = value.tolist()
+    if isinstance(value, list | tuple):
+        return [_plain(one, (*path, k)) for k, one in enumerate(value)]
+    if isinstance(value, os.PathLike):
+        return os.fspath(value)
+    if not isinstance(value, bool | int | float | str):
+        raise ConfigError(
+            f"{dotted(path)} = {value!r}: expected a number, a text, a list or a table"
+        )
+    return value
+
+
 def template(problem: str) -> str:
     """Return commented TOML for a problem: every key with its help, bounds and default.
 
-    Raises ConfigError, which names the most similar problem, if there is no problem of that name.
+    problem: a name, or the path of a Python file, which ends in .py. Raises ConfigError, which
+    names the most similar problem, if there is no problem of that name.
     """
-    problems = registry.names("sph.problems")
-    if problem not in problems:
+    if problem.endswith(".py"):
+        default = _resolve(reading.Source(problem, {"problem": {"file": problem}}, {}), ())
+        return commented.text({name: getattr(default, name) for name in _names()})
+    if outside.problem_class(problem) is None:
+        problems = outside.names()
         raise ConfigError(f'unknown problem "{problem}"; {suggestion(problem, problems)}')
     default = from_text(f'[problem]\nname = "{problem}"\n')
     return commented.text({name: getattr(default, name) for name in _names()})

@@ -1,5 +1,6 @@
 """Reading of a configuration: TOML text to validated tables, with the line of each key."""
 
+import os
 import re
 import tomllib
 from collections.abc import Iterable, Sequence
@@ -9,18 +10,16 @@ from typing import Any, NamedTuple
 from pydantic import ValidationError
 from pydantic_core import ErrorDetails
 
-from sph import registry
-from sph.config import checks, physics
+from sph.config import checks, outside, physics, problem_choice
 from sph.config.errors import (
     Issue,
     dotted,
     explain,
     not_finite,
     suggestion,
-    wrong_value,
 )
 from sph.config.toml_text import Path, key_lines, value_text
-from sph.errors import ConfigError, DeclarationError, FileError
+from sph.errors import ConfigError, FileError
 from sph.problems.base import Problem, Section
 
 # Keys that exclude each other: if the user gives one, the default of the other is not used.
@@ -34,6 +33,9 @@ _IN_PLACE_OF = {
 # equation of state of a liquid must not get a solid.
 _WITHOUT_DEFAULT = {**_IN_PLACE_OF, "physics.strength": ("eos", "gamma", "materials")}
 
+# Keys of [problem] whose relative paths begin at the directory of the configuration file.
+PATHS = ("file", "path")
+
 
 class Source(NamedTuple):
     """Tables before validation, and the origin of each key: a line number or an override."""
@@ -41,6 +43,7 @@ class Source(NamedTuple):
     name: str
     tables: dict[str, Any]
     places: dict[Path, int | str]
+    directory: str = ""  # of the file; "" is the current directory
 
     def place(self, path: Path) -> int | str:
         """Return the origin of `path`, or of the innermost table around it that has one, else 0."""
@@ -81,12 +84,33 @@ def read(path: str | FilePath) -> str:
         raise FileError(f"{path}: not a configuration file (it is not UTF-8 text)") from None
 
 
-def parse(text: str, name: str) -> Source:
-    """Return the tables of a TOML text. Raises ConfigError if the text is not valid TOML."""
+def parse(text: str, name: str, directory: str = "") -> Source:
+    """Return the tables of a TOML text. Raises ConfigError if the text is not valid TOML.
+
+    directory: where relative paths in the text begin.
+    """
     try:
-        return Source(name, tomllib.loads(text), dict(key_lines(text)))
+        return Source(name, tomllib.loads(text), dict(key_lines(text)), directory)
     except (ValueError, RecursionError) as error:
         raise ConfigError(_syntax_message(str(error), text, name)) from None
+
+
+def read_to_copy(path: str | FilePath) -> str:
+    """Return the text of a configuration file, with absolute paths, for a copy elsewhere.
+
+    Raises FileError and ConfigError.
+    """
+    text, directory = read(path), FilePath(path).parent
+    source, lines = parse(text, str(path)), text.splitlines(keepends=True)
+    given = source.tables.get("problem")
+    for key, value in given.items() if isinstance(given, dict) else ():
+        line = source.places.get(("problem", key))
+        if key in PATHS and isinstance(value, str) and value and isinstance(line, int):
+            absolute = f"{key} = {value_text(os.path.abspath(directory / value))}"
+            found = re.search(rf"""\b{key}\s*=\s*("[^"]*"|'[^']*')""", lines[line - 1])
+            if found:
+                lines[line - 1] = lines[line - 1].replace(found[0], absolute, 1)
+    return "".join(lines)
 
 
 def _syntax_message(message: str, text: str, name: str) -> str:
@@ -137,11 +161,13 @@ def resolve(
     overrides: Sequence[str],
     sections: dict[str, type[Section]],
     recorded: bool = False,
+    problem: type[Problem] | None = None,
 ) -> dict[str, Any]:
     """Return the validated tables by name. Raises ConfigError with one line for each error.
 
     recorded: the source is the configuration of an existing run. Such a run stays readable even if
-    a new run with its settings would be refused.
+    a new run with its settings would be refused. problem: class of the problem, if not chosen by
+    [problem].
     """
     for override in overrides:
         _set(source, override)
@@ -150,7 +176,10 @@ def resolve(
     }  # fmt: skip
     raw, issues = _known_tables(source.tables, models)
     issues += checks.both_given(raw)
-    problem = _problem_class(raw["problem"], issues)
+    if problem is None:
+        is_in_file = isinstance(source.places.get(("problem", "file")), int)
+        start, run = source.directory if is_in_file else "", source.name if recorded else ""
+        problem = problem_choice.chosen(raw["problem"], start, issues, run)
     if problem is not None:
         models["problem"] = problem
         raw["physics"].setdefault(
@@ -167,7 +196,8 @@ def resolve(
             continue
         spoilt = {issue.path[1] for issue in issues if issue.path[0] == name and issue.path[1:]}
         try:
-            found[name] = model.model_validate(_without(raw[name], spoilt))
+            with outside.validating(model):
+                found[name] = model.model_validate(_without(raw[name], spoilt))
         except ValidationError as error:
             details = _details(error, problem is not None, bool(spoilt))
             tables = _tables_of_keys(models, besides=name)
@@ -243,24 +273,6 @@ def _tables_of_keys(models: dict[str, type[Section]], besides: str = "") -> dict
     }
 
 
-def _problem_class(raw: dict[str, Any], issues: list[Issue]) -> type[Problem] | None:
-    """Return the class of the problem named in `raw`, or None, with an issue, if there is none."""
-    valid, path = registry.names("sph.problems"), ("problem", "name")
-    name = raw.get("name")
-    if name in valid:
-        module = registry.load("sph.problems", name)
-        if not hasattr(module, "Problem"):
-            raise DeclarationError(f"{module.__file__}: expected a class Problem")
-        return module.Problem
-    if name is None:
-        issues.append(Issue(path, f"is missing: expected one of {', '.join(valid)}"))
-    elif isinstance(name, str):
-        issues.append(Issue(path, f'= "{name}" is not a problem; {suggestion(name, valid)}'))
-    else:
-        issues.append(wrong_value(path, name, str))
-    return None
-
-
 def _fill_defaults(
     raw: dict[str, dict[str, Any]], problem: type[Problem], models: dict[str, type[Section]]
 ) -> None:
@@ -272,6 +284,7 @@ def _fill_defaults(
     for key, value in problem.defaults.items():
         table, name = key.split(".", 1)
         if name not in models[table].model_fields:
+            problem_choice.check_physics_key(problem, name, raw["physics"])
             continue
         if not given & {f"{table}.{other}" for other in _WITHOUT_DEFAULT.get(key, ())}:
             raw[table].setdefault(name, value)

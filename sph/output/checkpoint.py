@@ -22,6 +22,7 @@ import numpy as np
 
 from sph import config as configuration
 from sph import extensions, fingerprint
+from sph.config import outside
 from sph.errors import ConfigError, FileError
 from sph.output import hdf5, layout, stored, validity
 from sph.output.files import Damaged, PatientFile, is_sealed, opened, replacing, seal
@@ -116,6 +117,11 @@ def read(path: Path) -> Checkpoint:
     checkpoint = _checkpoint(path, state, config, texts)
     _check_state(path, checkpoint)
     return checkpoint
+
+
+def hash_of(checkpoint: Checkpoint) -> str:
+    """SHA-256 of the state of a checkpoint, whichever file it is in."""
+    return state_hash(_state(checkpoint))
 
 
 def state_hash(state: dict[str, np.ndarray]) -> str:
@@ -250,10 +256,13 @@ def _config(path: Path, texts: dict[str, str]) -> configuration.Config:
     except (ConfigError, RecursionError) as error:
         added = f", with its {extensions.PACKAGE} on the Python path"
         of_users = extensions.PACKAGE in texts.get("computed_by", "")
+        sources = [key for key in outside.SOURCES if f"\n{key} = " in texts["configuration"]]
+        remedy = f"the version of sph that wrote it{added * of_users}"
+        if sources:
+            remedy = "the problem as it was (of a file, problem.py in the run directory is a copy)"
         raise FileError(
             f"{path} has a configuration that is invalid in this version of sph ({__version__}): "
-            f"{error}\nTry: the version of sph that wrote it{added * of_users}, or start the run "
-            "again."
+            f"{error}\nTry: {remedy}, or start the run again."
         ) from error
 
 

@@ -25,6 +25,7 @@ from sph.output.files import (
     read_text,
     refuse_link,
     remove_unfinished,
+    replacing,
     write_text,
 )
 from sph.output.json_text import json_text
@@ -96,6 +97,11 @@ class RunDirectory:
     @property
     def summary(self) -> Path:
         return self.path / "summary.json"
+
+    @property
+    def problem(self) -> Path:
+        """Path of a copy of the user's problem file, as the file was when the run began."""
+        return self.path / "problem.py"
 
     @property
     def offenders(self) -> Path:
@@ -197,6 +203,11 @@ class RunDirectory:
         """Write config.toml atomically. Raises FileError."""
         write_text(self.config, MARK + text)
 
+    def write_problem(self, source: bytes) -> None:
+        """Write the copy of the user's problem file atomically. Raises FileError."""
+        with replacing(self.problem) as unfinished:
+            unfinished.write(source)
+
     def write_summary(self, summary: Mapping) -> None:
         """Write summary.json atomically, with non-finite numbers as "nan", "inf" and "-inf".
 
@@ -264,7 +275,7 @@ class RunDirectory:
             )
         if self.figures.is_dir() and not self.figures.is_symlink():
             shutil.rmtree(self.figures)
-        for path in (self.history, self.summary, self.offenders, *self.checkpoints()):
+        for path in (self.history, self.summary, self.offenders, self.problem, *self.checkpoints()):
             path.unlink(missing_ok=True)
         self.write_config("")  # keeps MARK, so that this remains a run directory
 

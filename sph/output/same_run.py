@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from sph import config as configuration
+from sph.config.outside import SOURCES
 from sph.errors import ConfigError, FileError
 from sph.output import history
 from sph.output.checkpoint import Checkpoint
@@ -25,11 +26,9 @@ def check_configuration(path: Path, checkpoint: Checkpoint) -> None:
 
 def check_problem(path: Path, problem, of_the_run) -> None:
     """Raise FileError if the problem in `path` differs from that of the run."""
-    if problem != of_the_run:
-        keys = problem.model_dump() | of_the_run.model_dump()
-        other = [
-            key for key in keys if getattr(problem, key, None) != getattr(of_the_run, key, None)
-        ]
+    there, here = problem.model_dump(), of_the_run.model_dump()
+    keys = [key for key in there | here if key not in SOURCES]
+    if other := [key for key in keys if there.get(key) != here.get(key)]:
         raise _other(path, f"problem.{', problem.'.join(other)} differ from its other files")
 
 

@@ -1,6 +1,6 @@
 """The directory of a sweep: its configuration, its points, and their runs.
 
-    base.toml    the configuration, as the user gave it
+    base.toml    the configuration, as the user gave it but for absolute paths
     sweep.toml   the keys that are set and varied, and the points by name
     logs/        a log for each point, and the reason of its last failure
     <point>/     a run directory
@@ -80,12 +80,12 @@ class SweepDirectory:
             if self.is_one:
                 plan = self._extended(plan, resolved)
             elif self.path.exists():
-                self._refuse_other_things(reading.read(config))
+                self._refuse_other_things(reading.read_to_copy(config))
             self._refuse_other_runs(resolved)
             refuse_link(self.logs)
             self.logs.mkdir(parents=True, exist_ok=True)
         if not self.is_one:
-            write_text(self.base, reading.read(config))
+            write_text(self.base, reading.read_to_copy(config))
         write_text(self.manifest, _text(plan))
 
     def failures(self) -> dict[str, str]:

@@ -16,6 +16,7 @@ from numba import njit
 from sph import declarations, kernels, registry, simd
 from sph.cli import main
 from sph.compiled import FLAGS
+from sph.config import outside
 from sph.config.choices import ModelChoice
 from sph.config.sections import SECTIONS
 
@@ -86,6 +87,7 @@ def keys() -> dict[str, set[str]]:
     """
     found = {name: set(table.model_fields) for name, table in SECTIONS.items() if name != "report"}
     found["problem"] = {key for problem in models("sph.problems") for key in problem.model_fields}
+    found["problem"] |= {"file", *outside.SOURCES}
     return found
 
 

@@ -108,6 +108,8 @@ SCENES = {
 class Watch:
     """Progress that keeps the notes and calls back, e.g. `at_step(simulation)` after each step."""
 
+    each_step = False
+
     def __init__(self, at_step=None, at_note=None, at_start=None, at_checkpoint=None):
         self.at_step, self.at_note = at_step, at_note
         self.at_start, self.at_checkpoint = at_start, at_checkpoint

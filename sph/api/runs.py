@@ -1,0 +1,140 @@
+"""Runs that a script starts."""
+
+import logging
+import os
+import shutil
+import tempfile
+import weakref
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Any, Literal
+
+from sph import config as configuration
+from sph import progress, runner
+from sph.analysis import reference
+from sph.api.results import Run
+from sph.api.view import View
+from sph.config import Config
+from sph.errors import Stopped
+from sph.output.run_directory import RunDirectory
+from sph.scene import Scene
+
+CALLBACK = "the callback"  # which stopped the run, in messages and in the summary
+
+log = logging.getLogger("sph")
+
+
+def run(
+    config: str | os.PathLike[str] | Mapping[str, Any] | Config,
+    overrides: Sequence[str] | Mapping[str, Any] = (),
+    callback: Callable[[View], object] | None = None,
+    output: str | os.PathLike[str] | None = None,
+    *,
+    each: Literal["output", "step"] = "output",
+    force: bool = False,
+    show_progress: bool = False,
+) -> Run:
+    """Run a configuration to its end, and return the run.
+
+    config: path of a configuration file; or its tables as a dictionary, with the keys of
+      docs/configuration.md; or the `config` of another run.
+    overrides: keys to change, {"problem.n": 400} or ["problem.n=400"] as after --set.
+    callback: called with the simulation (`View`) at t = 0 and after each checkpoint, or after each
+      time step if each = "step". If it returns False, the run stops with a checkpoint, and the
+      status "stopped".
+    output: run directory, which must not hold a run unless `force` is true; if None, a temporary
+      directory, which is removed once nothing refers to the returned run.
+    show_progress: show the progress on stderr, as `sph run` does. Otherwise notes, such as that
+      code is being compiled, go to the logger "sph".
+
+    Raises ConfigError, NumericalError and FileError with the messages of `sph run`, and Stopped
+    if a signal (Ctrl-C) stops the run.
+
+    >>> tube = {"problem": {"name": "shock_tube", "n": 100}, "time": {"end": 0.05}}
+    >>> done = sph.run(tube, overrides={"physics.alpha": 1.0})
+    >>> done.status
+    'done'
+    >>> bool(done.summary["errors"]["fields"]["density"]["relative_L1"] < 0.1)
+    True
+    >>> bool(done.history["t"][-1] == done.checkpoints[-1].time == 0.05)
+    True
+    """
+    resolved = _resolved(config, overrides)
+    target = None if output is None else Path(output)
+    reference.check(resolved, target)
+    _ = Scene(resolved).all_parts  # errors of declarations, before a directory is made
+    scratch = None
+    if target is None:
+        scratch = tempfile.mkdtemp(prefix="sph-")
+        target = Path(scratch)
+    try:
+        directory = RunDirectory.create(target, force)
+        shown = progress.suited() if show_progress else _Log()
+        try:
+            runner.run(resolved, directory, _Watched(shown, callback, each))
+        except Stopped as stopped:
+            if CALLBACK not in str(stopped):
+                raise
+        done = Run(directory)
+    except BaseException:
+        if scratch:
+            shutil.rmtree(scratch, ignore_errors=True)
+        raise
+    if scratch:
+        weakref.finalize(done, shutil.rmtree, scratch, ignore_errors=True)
+    return done
+
+
+def _resolved(config: Any, overrides: Sequence[str] | Mapping[str, Any]) -> Config:
+    texts = configuration.as_overrides(overrides)
+    if isinstance(config, Config):
+        return config.override(texts)
+    if isinstance(config, Mapping):
+        return configuration.from_tables(config, texts)
+    return configuration.load(Path(config), texts)
+
+
+class _Log(progress.Messages):
+    """Progress that writes notes to the logger."""
+
+    def note(self, text):
+        log.info(text)
+
+    def start(self, begin, end): ...
+
+    def step(self, simulation): ...
+
+    def wrote(self, path, simulation): ...
+
+
+class _Watched(progress.Messages):
+    """Progress that also calls the callback of a script, which may stop the run."""
+
+    def __init__(self, shown: Any, callback: Callable[[View], object] | None, each: str):
+        if each not in ("output", "step"):
+            raise ValueError(f'each = {each!r}: expected "output" or "step"')
+        self.shown, self.callback = shown, callback
+        self.each_step = callback is not None and each == "step"
+
+    def note(self, text):
+        self.shown.note(text)
+
+    def start(self, begin, end):
+        self.shown.start(begin, end)
+
+    def close(self):
+        self.shown.close()
+
+    def step(self, simulation):
+        self.shown.step(simulation)
+        return self._reason(simulation) if self.each_step else None
+
+    def wrote(self, path, simulation):
+        self.shown.wrote(path, simulation)
+        return None if self.each_step else self._reason(simulation)
+
+    def _reason(self, simulation) -> str | None:
+        """Call back. Return why the run is to stop, or None."""
+        if self.callback is None:
+            return None
+        return CALLBACK if self.callback(View(simulation)) is False else None

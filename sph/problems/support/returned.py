@@ -1,0 +1,92 @@
+"""Checks of what the methods of a problem return, in words for a user who wrote the problem."""
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+# Shape of each array by name: "N", or "DN" for a vector.
+STATE = {"position": "DN", "velocity": "DN", "mass": "N", "internal_energy": "N"}
+EXACT = {"density": "N", "velocity": "DN", "pressure": "N", "internal_energy": "N"}
+
+
+def fault_of_state(problem, state: Any, *_, **__) -> str:
+    """Return what is wrong with an initial state, or ""; problem: for the number of dimensions."""
+    missing = [name for name in STATE if not hasattr(state, name)]
+    if missing:
+        return f"a {type(state).__name__}; expected sph.problems.base.InitialState"
+    arrays = {name: getattr(state, name) for name in STATE}
+    shape = np.shape(state.position)
+    is_position = len(shape) == 2 and shape[0] == problem.dimension
+    number = shape[1] if is_position else np.size(state.mass)
+    if not number:
+        return f"position of the shape {shape}; expected (D, N), with N particles"
+    fault = fault_of_arrays(arrays, STATE, problem.dimension, number)
+    if not fault and not np.all(arrays["mass"] > 0):
+        fault = "masses that are not above 0"
+    return fault or _fault_outside(problem, np.asarray(arrays["position"]))
+
+
+def _fault_outside(problem, position: np.ndarray) -> str:
+    """Return the first particle outside the box along an axis that is not open, or ""."""
+    for axis, ((low, high), boundary) in enumerate(
+        zip(problem.box, problem.boundaries, strict=True)
+    ):
+        outside = np.flatnonzero((position[axis] < low) | (position[axis] > high))
+        if outside.size and boundary != "open":
+            i = outside[0]
+            return (
+                f"particle {i + 1} at {'xyz'[axis]} = {position[axis, i]:g}, outside the domain "
+                f"[{low:g}, {high:g}], which is {boundary} along that axis"
+            )
+    return ""
+
+
+def fault_of_arrays(arrays: dict, shapes: dict[str, str], dimension: int, number: int) -> str:
+    """Return the first array that is not of numbers or of another shape, or ""."""
+    for name, shape in shapes.items():
+        array = np.asarray(arrays[name])
+        if array.dtype.kind not in "fiu":
+            return f"{name} of the type {array.dtype}; expected numbers"
+        expected = (dimension, number) if shape == "DN" else (number,)
+        if array.shape != expected:
+            hint = ". Try: the transpose" if array.shape == expected[::-1] != expected else ""
+            words = "(D, N)" if shape == "DN" else "(N,)"
+            return f"{name} of the shape {array.shape}; expected {words} = {expected}{hint}"
+        if not np.all(np.isfinite(array)):
+            return f"{name} with values that are not finite"
+    return ""
+
+
+def _fault_of_exact(problem, found: Any, eos, time: float, position: np.ndarray) -> str:
+    if found is None:
+        return ""
+    if not isinstance(found, dict) or not EXACT.keys() <= found.keys():
+        return f"{_words(found)}; expected a dictionary of {', '.join(EXACT)}"
+    arrays = {name: np.nan_to_num(np.asarray(found[name])) for name in EXACT}  # NaN: not known
+    return fault_of_arrays(arrays, EXACT, problem.dimension, np.shape(position)[-1])
+
+
+def _fault_of_numbers(problem, found: Any, *_, **__) -> str:
+    """Numbers by name: diagnostics, and numbers of the summary."""
+    if not isinstance(found, dict) or not all(isinstance(name, str) for name in found):
+        return f"{_words(found)}; expected a dictionary of numbers by name"
+    for name, value in found.items():
+        if np.ndim(value) or not isinstance(value, (int, float, np.number)):
+            return f"{name} = {_words(value)}; expected a number"
+    return ""
+
+
+def _words(value: Any) -> str:
+    text = repr(value)
+    return text if len(text) < 60 else f"a {type(value).__name__}"
+
+
+CHECKS: dict[str, Callable[..., str]] = {
+    "initial": fault_of_state,
+    "exact": _fault_of_exact,
+    "diagnostics": _fault_of_numbers,
+    "report": _fault_of_numbers,
+    "compare": _fault_of_numbers,
+    "over_time": _fault_of_numbers,
+}
