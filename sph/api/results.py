@@ -25,8 +25,9 @@ class Checkpoint(Particles):
     The file is read when the first field is asked for. Reading raises FileError.
     """
 
-    def __init__(self, path: Path):
-        self.path = path
+    def __init__(self, path: Path, scratch: object = None):
+        """scratch: what keeps a temporary directory; kept as long as this object."""
+        self.path, self._scratch = path, scratch
         super().__init__(lambda: self._read.particles, lambda: self._read.pressure)
 
     @cached_property
@@ -81,8 +82,9 @@ class Checkpoints(Sequence[Checkpoint]):
     memory of one.
     """
 
-    def __init__(self, paths: Sequence[Path]):
-        self._paths = tuple(paths)
+    def __init__(self, paths: Sequence[Path], scratch: object = None):
+        """scratch: see `Checkpoint`."""
+        self._paths, self._scratch = tuple(paths), scratch
         self._last: Checkpoint | None = None
 
     def __len__(self) -> int:
@@ -94,10 +96,10 @@ class Checkpoints(Sequence[Checkpoint]):
     def __getitem__(self, index: slice) -> "Checkpoints": ...
     def __getitem__(self, index: Any) -> Any:
         if isinstance(index, slice):
-            return Checkpoints(self._paths[index])
+            return Checkpoints(self._paths[index], self._scratch)
         path = self._paths[index]
         if self._last is None or self._last.path != path:
-            self._last = Checkpoint(path)
+            self._last = Checkpoint(path, self._scratch)
         return self._last
 
     def __iter__(self) -> Iterator[Checkpoint]:
@@ -110,8 +112,9 @@ class Checkpoints(Sequence[Checkpoint]):
 class Run:
     """A run: its directory, configuration, summary, history and checkpoints."""
 
-    def __init__(self, directory: RunDirectory):
-        self._directory = directory
+    def __init__(self, directory: RunDirectory, scratch: object = None):
+        """scratch: see `Checkpoint`."""
+        self._directory, self._scratch = directory, scratch
 
     @property
     def directory(self) -> Path:
@@ -145,7 +148,7 @@ class Run:
     @cached_property
     def checkpoints(self) -> Checkpoints:
         """The checkpoints, read when a field is asked for: `run.checkpoints[-1].density`."""
-        return Checkpoints(self._directory.checkpoints())
+        return Checkpoints(self._directory.checkpoints(), self._scratch)
 
     def __repr__(self) -> str:
         return f"<run in {self.directory}, {self.status}>"

@@ -43,7 +43,7 @@ def run(
       time step if each = "step". If it returns False, the run stops with a checkpoint, and the
       status "stopped".
     output: run directory, which must not hold a run unless `force` is true; if None, a temporary
-      directory, which is removed once nothing refers to the returned run.
+      directory, which is removed once nothing refers to the returned run and its checkpoints.
     show_progress: show the progress on stderr, as `sph run` does. Otherwise notes, such as that
       code is being compiled, go to the logger "sph".
 
@@ -65,24 +65,24 @@ def run(
     _ = Scene(resolved).all_parts  # errors of declarations, before a directory is made
     scratch = None
     if target is None:
-        scratch = tempfile.mkdtemp(prefix="sph-")
-        target = Path(scratch)
+        scratch = _Scratch()
+        target = scratch.path
+    directory = RunDirectory.create(target, force)
+    shown = progress.suited() if show_progress else _Log()
     try:
-        directory = RunDirectory.create(target, force)
-        shown = progress.suited() if show_progress else _Log()
-        try:
-            runner.run(resolved, directory, _Watched(shown, callback, each))
-        except Stopped as stopped:
-            if CALLBACK not in str(stopped):
-                raise
-        done = Run(directory)
-    except BaseException:
-        if scratch:
-            shutil.rmtree(scratch, ignore_errors=True)
-        raise
-    if scratch:
-        weakref.finalize(done, shutil.rmtree, scratch, ignore_errors=True)
-    return done
+        runner.run(resolved, directory, _Watched(shown, callback, each))
+    except Stopped as stopped:
+        if CALLBACK not in str(stopped):
+            raise
+    return Run(directory, scratch)
+
+
+class _Scratch:
+    """A temporary directory, which is removed when nothing refers to this object."""
+
+    def __init__(self):
+        self.path = Path(tempfile.mkdtemp(prefix="sph-"))
+        weakref.finalize(self, shutil.rmtree, self.path, ignore_errors=True)
 
 
 def _resolved(config: Any, overrides: Sequence[str] | Mapping[str, Any]) -> Config:

@@ -4,7 +4,7 @@ import dataclasses
 import functools
 import os
 from collections.abc import Mapping, Sequence
-from pathlib import Path as FilePath
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -14,7 +14,8 @@ from sph.config import commented, outside, reading
 from sph.config.errors import dotted, suggestion
 from sph.config.physics import Physics
 from sph.config.sections import RESOURCES, SECTIONS, Output, Report, Run, Time
-from sph.config.toml_text import Path, key_text, value_text
+from sph.config.toml_text import Path as KeyPath
+from sph.config.toml_text import key_text, value_text
 from sph.config.units import Units
 from sph.errors import ConfigError
 from sph.problems.base import Problem
@@ -54,12 +55,12 @@ class Config:
         return _resolve(source, overrides)
 
 
-def load(path: str | FilePath, overrides: Sequence[str] = ()) -> Config:
+def load(path: str | Path, overrides: Sequence[str] = ()) -> Config:
     """Return the configuration in a file, with the overrides `a.b=VALUE` applied.
 
     Raises FileError if the file cannot be read, and ConfigError that lists every error in it.
     """
-    directory = str(FilePath(path).parent)
+    directory = str(Path(path).parent)
     return _resolve(reading.parse(reading.read(path), str(path), directory), overrides)
 
 
@@ -94,7 +95,7 @@ def as_overrides(overrides: Sequence[str] | Mapping[str, Any]) -> list[str]:
     return [f"{key}={value_text(_plain(one, (key,)))}" for key, one in overrides.items()]
 
 
-def _plain(value: Any, path: Path = ()) -> Any:
+def _plain(value: Any, path: KeyPath = ()) -> Any:
     """Return a value as TOML has it: with numbers of Python, lists and texts.
 
     path: of its key, for messages. Raises ConfigError for what TOML cannot express.

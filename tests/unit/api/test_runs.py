@@ -125,7 +125,21 @@ def test_temporary_directory_lives_as_long_as_the_run():
     directory, last = run.directory, run.checkpoints[-1]
     assert last.density.size
     assert directory.is_dir()
-    del run
+    del run, last
+    gc.collect()
+    assert not directory.exists()
+
+
+def test_checkpoints_keep_temporary_directory():
+    checkpoints_alone = sph.run(TUBE).checkpoints
+    gc.collect()
+    assert checkpoints_alone[1].density.size
+    one = checkpoints_alone[-1:][0]
+    directory = one.path.parent
+    del checkpoints_alone
+    gc.collect()
+    assert one.density.size  # read only now
+    del one
     gc.collect()
     assert not directory.exists()
 
@@ -134,6 +148,7 @@ def test_temporary_directory_of_failed_run_is_removed(tmp_path, monkeypatch):
     monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
     with pytest.raises(sph.NumericalError, match="energy"):
         sph.run(TUBE, {"physics.max_energy_drift": 1e-12})
+    gc.collect()
     assert os.listdir(tmp_path) == []
 
 
