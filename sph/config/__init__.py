@@ -52,7 +52,8 @@ def load(path: str | Path, overrides: Sequence[str] = ()) -> Config:
 
     Raises FileError if the file cannot be read, and ConfigError that lists every error in it.
     """
-    return _resolve(reading.parse(reading.read(path), str(path)), overrides)
+    directory = str(Path(path).parent)
+    return _resolve(reading.parse(reading.read(path), str(path), directory), overrides)
 
 
 def from_text(text: str, source: str = "the configuration") -> Config:

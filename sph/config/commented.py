@@ -23,8 +23,10 @@ def text(sections: Mapping[str, Section]) -> str:
 
 def _table(name: str, section: Section) -> str:
     model = type(section)
+    unset = getattr(model, "filled_in", ())
+    values = {key: None if key in unset else getattr(section, key) for key in model.model_fields}
     keys = (
-        _key(key, field, _help(model, key), getattr(section, key), _restart(model, key))
+        _key(key, field, _help(model, key), values[key], _restart(model, key))
         for key, field in model.model_fields.items()
     )
     summary = _comment(docstring(model).partition("\n\n")[0])

@@ -1,5 +1,6 @@
 """Reading of a configuration: TOML text to validated tables, with the line of each key."""
 
+import os
 import re
 import tomllib
 from collections.abc import Iterable, Sequence
@@ -38,6 +39,7 @@ class Source(NamedTuple):
     name: str
     tables: dict[str, Any]
     places: dict[Path, int | str]
+    directory: str = ""  # of the file; "" is the current directory
 
     def place(self, path: Path) -> int | str:
         """Return the origin of `path`, or of the innermost table around it that has one, else 0."""
@@ -78,10 +80,13 @@ def read(path: str | FilePath) -> str:
         raise FileError(f"{path}: not a configuration file (it is not UTF-8 text)") from None
 
 
-def parse(text: str, name: str) -> Source:
-    """Return the tables of a TOML text. Raises ConfigError if the text is not valid TOML."""
+def parse(text: str, name: str, directory: str = "") -> Source:
+    """Return the tables of a TOML text. Raises ConfigError if the text is not valid TOML.
+
+    directory: where relative paths in the text begin.
+    """
     try:
-        return Source(name, tomllib.loads(text), dict(key_lines(text)))
+        return Source(name, tomllib.loads(text), dict(key_lines(text)), directory)
     except (ValueError, RecursionError) as error:
         raise ConfigError(_syntax_message(str(error), text, name)) from None
 
@@ -156,6 +161,9 @@ def resolve(
         models["physics"] = physics.chosen(raw["physics"])
         _fill_defaults(raw, problem, models)
         _fill_tables(raw["problem"], source, problem)
+        _make_paths_absolute(raw["problem"], source, problem)
+        raw["problem"], faults = problem.filled(raw["problem"])
+        issues += [Issue(("problem", *fault.path), fault.text) for fault in faults]
         issues += checks.shape_issues(raw["problem"], problem)
     issues += not_finite(raw)
     found = {}
@@ -271,6 +279,15 @@ def _fill_defaults(
             continue
         if not any(other in raw[table] for other in _IN_PLACE_OF.get(key, ())):
             raw[table].setdefault(name, value)
+
+
+def _make_paths_absolute(raw: dict[str, Any], source: Source, problem: type[Problem]) -> None:
+    """Let paths in the file begin at its directory, and those of --set at the current one."""
+    for key in problem.paths:
+        if isinstance(path := raw.get(key), str) and path:
+            is_in_file = isinstance(source.places.get(("problem", key)), int)
+            start = source.directory if is_in_file else ""
+            raw[key] = os.path.abspath(os.path.join(start, path))
 
 
 def _fill_tables(raw: dict[str, Any], source: Source, problem: type[Problem]) -> None:
