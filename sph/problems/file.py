@@ -114,7 +114,7 @@ class Problem(base.Problem):
 
     @model_validator(mode="after")
     def _has_particles_inside(self):
-        kept = files.kept(self.path, self.dimension)
+        kept = files.kept(self.path, self.sha256, self.dimension)
         if kept is not None and self.box.shape == (len(self.boundaries), 2):
             contents.check_inside(kept, self.box, self.boundaries)
         return self
@@ -125,7 +125,7 @@ class Problem(base.Problem):
 
     def initial(self, eos) -> base.InitialState:
         """Return the particles of the file, in the order of their IDs if the file has some."""
-        found = files.take(self.path, self.dimension)
+        found = files.take(self.path, self.sha256, self.dimension)
         stated = {"sha256": found.sha256, "n": found.mass.size}
         if faults := _contradictions(self.model_dump(), stated):
             raise ConfigError("\n".join(f"problem.{one.path[0]} {one.text}" for one in faults))

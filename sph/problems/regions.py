@@ -29,7 +29,7 @@ class Placed(NamedTuple):
     """Particles before they have gas."""
 
     position: np.ndarray  # (D, N)
-    mass: np.ndarray | None = None  # (N,); density times the volume of a cell if None
+    mass: np.ndarray | float  # (N,), or the volume by which the density is multiplied
     members: np.ndarray | None = None  # (R, N) which belong to each region; None: those inside
 
 
@@ -122,7 +122,7 @@ class Problem(base.Problem):
 
     def _wrong_values(self) -> list[Fault]:
         """Return regions without particles, and faults of the values at a lattice."""
-        position, cell = self._even
+        position, cell = self._even()
         if not position.size:
             return [Fault(("region",), "holds no particle: expected regions inside the domain")]
         volume = float(np.prod(self.box[:, 1] - self.box[:, 0]))
@@ -137,7 +137,6 @@ class Problem(base.Problem):
     def _areas(self) -> tuple[areas.Area, ...]:
         return tuple(region.area(self.box) for region in self.region)
 
-    @cached_property
     def _even(self) -> tuple[np.ndarray, float]:
         """Positions (D, N) of equal spacing, and the volume of a particle."""
         return areas.covered(self.box, self.n, self.lattice, self._is_gas)
@@ -235,20 +234,20 @@ class Problem(base.Problem):
         density = gas.values["density",]
         velocity = np.array([gas.values["velocity", axis] for axis in range(self.dimension)])
         energy = eos.internal_energy(density, gas.values["pressure",])
-        found = density * self._even[1] if mass is None else mass
+        found = density * mass if isinstance(mass, float) else mass
         return base.InitialState(position, velocity, found, energy, {"density": density})
 
     def _placed(self) -> Placed:
-        position, cell = self._even
+        position, cell = self._even()
         if self.masses == "equal":
             return self._equal_masses()
         if self.relax is None:
-            return Placed(position)
+            return Placed(position, cell)
         start = lattice.with_noise(position, self.box, 0.5, self.relax.seed)
-        return Placed(self._relaxed(start, lambda x: np.full(x.shape[1], cell)))
+        return Placed(self._relaxed(start, lambda x: np.full(x.shape[1], cell)), cell)
 
     def _equal_masses(self) -> Placed:
-        position, cell = self._even
+        position, cell = self._even()
         if self.relax is None:
             each = float(self._density(position).sum() * cell / position.shape[1])
             return self._separate_lattices(each)

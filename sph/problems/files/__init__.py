@@ -31,18 +31,20 @@ def read(path: str, dimension: int | None) -> Contents:
     return found
 
 
-def kept(path: str, dimension: int) -> Contents | None:
+def kept(path: str, sha256: str, dimension: int) -> Contents | None:
     """Return the contents of the last `read` if that was of this file, or None."""
-    last = _last[0] if _last else None
-    return last if last and (last.path, len(last.position)) == (path, dimension) else None
+    for last in _last:
+        if (last.path, last.sha256, len(last.position)) == (path, sha256, dimension):
+            return last
+    return None
 
 
-def take(path: str, dimension: int) -> Contents:
+def take(path: str, sha256: str, dimension: int) -> Contents:
     """Return the contents of the last `read` if that was of this file, otherwise read it.
 
     Nothing is kept, so that the memory is free once the caller has used the arrays.
     """
-    found = kept(path, dimension)
+    found = kept(path, sha256, dimension)
     _last.clear()
     return found or _read(path, dimension)
 

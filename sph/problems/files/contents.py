@@ -98,36 +98,29 @@ def check(found: Contents) -> Contents:
         _check_finite(found.path, names[key], getattr(found, key))
     for key, array in found.others.items():
         _check_finite(found.path, names.get(key, key), array)
-    _check_sign(found.path, names["mass"], found.mass, found.mass > 0.0, "above 0")
+    _check_all(found.path, names["mass"], found.mass, found.mass > 0.0, "numbers above 0")
     energy = found.internal_energy
-    _check_sign(found.path, names["internal_energy"], energy, energy >= 0.0, "of at least 0")
+    _check_all(found.path, names["internal_energy"], energy, energy >= 0.0, "numbers of at least 0")
     if "density" in found.others:
         density = found.others["density"]
-        _check_sign(found.path, names["density"], density, density > 0.0, "above 0")
+        _check_all(found.path, names["density"], density, density > 0.0, "numbers above 0")
     return found
 
 
 def _check_finite(path: str, name: str, array: np.ndarray) -> None:
-    fine = np.isfinite(array) if array.ndim == 1 else np.isfinite(array).all(axis=0)
-    if not fine.all():
-        first = int(np.argmin(fine))
-        raise refusal(
-            path,
-            f"{name} has {array[..., first]} in row {first} (from 0), one of {(~fine).sum()} rows "
-            "with a NaN or an infinity",
-            "finite numbers",
-        )
+    _check_all(path, name, array, np.isfinite(array), "finite numbers")
 
 
-def _check_sign(path: str, name: str, array: np.ndarray, fine: np.ndarray, expected: str) -> None:
-    if not fine.all():
-        first = int(np.argmin(fine))
-        raise refusal(
-            path,
-            f"{name} has {array[first]:.6g} in row {first} (from 0), one of {(~fine).sum()} wrong "
-            "rows",
-            f"numbers {expected}",
-        )
+def _check_all(path: str, name: str, array: np.ndarray, fine: np.ndarray, expected: str) -> None:
+    """Raise FileError unless all entries of an array, (N,) or (D, N), are fine."""
+    if fine.all():
+        return
+    rows = fine.reshape(-1, fine.shape[-1]).all(axis=0)
+    first = int(np.argmin(rows))
+    values = np.atleast_1d(array[..., first][~fine[..., first]])
+    wrong = int((~rows).sum())
+    count = f"; {wrong} rows in all are wrong" if wrong > 1 else ""
+    raise refusal(path, f"{name} has {values[0]:.6g} in row {first} (from 0){count}", expected)
 
 
 def check_inside(found: Contents, box: np.ndarray, boundaries: tuple[str, ...]) -> None:
@@ -147,8 +140,8 @@ def check_inside(found: Contents, box: np.ndarray, boundaries: tuple[str, ...]) 
             raise refusal(
                 found.path,
                 f"{found.names['position']} has {x[first]:.9g} along {'xyz'[axis]} for particle "
-                f"{first + 1}, one of {outside.sum()} outside the box",
-                f"from {low:.9g} to {high:.9g}, because this axis is {kind}",
+                f"{first + 1}: {outside.sum()} particle(s) are outside the box",
+                f"{low:.9g} to {high:.9g}, because the boundary along {'xyz'[axis]} is {kind}",
                 'problem.domain = [lo, hi], or problem.boundary = "open"',
             )
         np.clip(x, low, high, out=x)

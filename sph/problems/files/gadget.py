@@ -31,7 +31,7 @@ NAMES = {
     "id": ("ParticleIDs", "ParticleID"),
 }
 TYPES = ("gas", "dark matter", "disk", "bulge", "stars", "black holes or boundary", "neutrinos")
-DAMAGE = (OSError, RuntimeError, KeyError, ValueError, TypeError, AttributeError)
+DAMAGE = (OSError, RuntimeError, KeyError, ValueError, TypeError, AttributeError, MemoryError)
 
 
 def read(file: io.IOBase, path: str, dimension: int | None, digest: str) -> Contents:
@@ -47,8 +47,11 @@ def read(file: io.IOBase, path: str, dimension: int | None, digest: str) -> Cont
             "it is neither an HDF5 file nor an .npz file, or it is cut short",
             "HDF5 in the layout of GADGET or SWIFT, or an .npz file",
         ) from None
-    with opened:
-        return _File(opened, path).contents(dimension, digest)
+    try:
+        with opened:
+            return _File(opened, path).contents(dimension, digest)
+    except DAMAGE as error:
+        raise refusal(path, f"it cannot be read ({error})", "an intact HDF5 file") from error
 
 
 class _File:
@@ -156,7 +159,8 @@ class _File:
                 break
         else:
             found = rows.shape[1]
-        flat = [axis for axis in range(int(found)) if len(rows) > 1 and np.ptp(rows[:, axis]) == 0]
+        axes = range(min(int(found), rows.shape[1]))
+        flat = [axis for axis in axes if len(rows) > 1 and np.ptp(rows[:, axis]) == 0]
         if flat and flat[0] > 0:
             raise refusal(
                 self.path,
@@ -243,7 +247,7 @@ class _File:
         if same.size:
             raise refusal(
                 self.path,
-                f"{name} has {ranked[same[0]]} more than once, one of {same.size} repetition(s)",
+                f"{name} has {ranked[same[0]]} more than once; {same.size} repetition(s)",
                 "a different number for each particle",
                 "a copy without ParticleIDs: particles then keep their order",
             )

@@ -3,17 +3,19 @@
 Lower faces belong to a part and upper faces do not, so that adjacent parts share no point.
 """
 
-from typing import NamedTuple
+from dataclasses import dataclass
 
 import numpy as np
 
 from sph.problems.support.bodies import Shape
 from sph.problems.support.lattice import fill, grid, unit_cell, whole_cells
 
+ROUNDS = 2  # lattices after the first that `covered` tries to come near a number of particles
 FINER = 4  # cells for each particle along an axis in `sampled`, so that counts follow the density
 
 
-class Everywhere(NamedTuple):
+@dataclass(frozen=True, eq=False)  # configurations are compared, and arrays have no truth value
+class Everywhere:
     """The whole box."""
 
     box: np.ndarray  # (D, 2)
@@ -26,7 +28,8 @@ class Everywhere(NamedTuple):
         return np.ones(position.shape[1], dtype=bool)
 
 
-class HalfSpace(NamedTuple):
+@dataclass(frozen=True, eq=False)
+class HalfSpace:
     """The side of a plane (3-D), line (2-D) or point to which a normal vector points."""
 
     box: np.ndarray  # (D, 2)
@@ -41,7 +44,8 @@ class HalfSpace(NamedTuple):
         return ((position - self.point[:, None]) * self.normal[:, None]).sum(axis=0) >= 0.0
 
 
-class Solid(NamedTuple):
+@dataclass(frozen=True, eq=False)
+class Solid:
     """A shape of `sph.problems.support.bodies`, with its lower faces."""
 
     shape: Shape
@@ -81,13 +85,13 @@ def covered(box: np.ndarray, n: int, kind: str, inside) -> tuple[np.ndarray, flo
 
     inside: returns which of the positions (D, M) hold matter (M,); others have no particle.
     """
-    volume = float(np.prod(box[:, 1] - box[:, 0]))
     position = fill(box, n, kind)
     there = inside(position)
-    if there.all() or not there.any():
-        return position[:, there], volume / position.shape[1]
-    position = fill(box, round(n / there.mean()), kind)
-    return position[:, inside(position)], volume / position.shape[1]
+    for _ in range(ROUNDS if there.any() and not there.all() else 0):
+        position = fill(box, round(n / there.mean()), kind)
+        there = inside(position)
+    volume = float(np.prod(box[:, 1] - box[:, 0]))
+    return position[:, there], volume / position.shape[1]
 
 
 def within(box: np.ndarray, extent: np.ndarray, n: float, kind: str) -> tuple[np.ndarray, float]:
