@@ -47,8 +47,8 @@ def opens(boundaries: tuple[str, ...]) -> list[base.Fault]:
     """Return a fault if an axis is open: there gas would expand instead of relaxing."""
     if "open" not in boundaries:
         return []
-    text = f"needs closed boundaries; problem.boundary is {', '.join(boundaries)}"
-    return [base.Fault(("relax",), f'{text}: expected "periodic" or "mirror" along all axes')]
+    text = 'needs closed boundaries: expected problem.boundary "periodic" or "mirror" on all axes'
+    return [base.Fault(("relax",), text)]
 
 
 def relaxed(

@@ -1,4 +1,4 @@
-"""An initial state of gas from a file: HDF5 as GADGET and SWIFT write it, .npz, or a checkpoint."""
+"""An initial state of gas from a file: HDF5 of GADGET or SWIFT, .npz, or a checkpoint."""
 
 import os
 from typing import Annotated, Any, ClassVar, Literal

@@ -187,8 +187,8 @@ class Problem(base.Problem):
                 faults.append(Fault(("region", i), text))
             for path, value in region.values():
                 found = self._evaluated(i, value, position[:, inside])
-                if wrong := _wrong(path, found, position[:, inside]):
-                    faults.append(Fault(("region", i, *path), f"= {_shown(value)}: {wrong}"))
+                if wrong := _wrong(path, value, found, position[:, inside]):
+                    faults.append(Fault(("region", i, *path), wrong))
                 values[path][inside] = found
         owner = self._owner(members)
         lacking = (owner >= 0) & ~np.isfinite(values["pressure",])
@@ -279,19 +279,17 @@ class Problem(base.Problem):
         return _relax.relaxed(self.relax, position, domain, volume, sums)
 
 
-def _shown(value: Value) -> str:
-    return f'"{value}"' if isinstance(value, str) else f"{value:g}"
-
-
-def _wrong(path: Path, values: np.ndarray, position: np.ndarray) -> str | None:
-    """Return what is wrong with the values (M,) of a key at positions (D, M), or None."""
-    fine, expected = np.isfinite(values), "a finite number"
+def _wrong(path: Path, value: Value, found: np.ndarray, position: np.ndarray) -> str | None:
+    """Return what is wrong with the value of a key, `found` (M,) at positions (D, M), or None."""
+    fine, expected = np.isfinite(found), "a finite number"
     if path == ("density",):
-        fine, expected = fine & (values > 0.0), "a number above 0"
+        fine, expected = fine & (found > 0.0), "a number above 0"
     if path == ("pressure",):
-        fine, expected = fine & (values >= 0.0), "a number of at least 0"
+        fine, expected = fine & (found >= 0.0), "a number of at least 0"
     if fine.all():
         return None
+    if not isinstance(value, str):
+        return f"= {value:g}: expected {expected}"
     first = int(np.argmin(fine))
     where = ", ".join(f"{x:.6g}" for x in position[:, first])
-    return f"the value is {values[first]:g} at ({where}); expected {expected}"
+    return f'= "{value}": the value is {found[first]:g} at ({where}); expected {expected}'

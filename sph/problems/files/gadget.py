@@ -1,4 +1,4 @@
-"""Initial states in HDF5 files with the layout of GADGET and SWIFT, such as our own checkpoints.
+"""Initial states in HDF5 files with the layout of GADGET and SWIFT, as in checkpoints.
 
 Gas is /PartType0; its datasets have singular or plural names. Coordinates run from 0 to the
 attribute BoxSize of /Header, to which the attribute Origin of our own files is added.

@@ -1,4 +1,4 @@
-"""Parts of a box that contain gas: bodies, slabs and half-spaces, repeated by periodic boundaries.
+"""Parts of a box that contain gas: bodies, slabs and half-spaces, also periodic.
 
 Lower faces belong to a part and upper faces do not, so that adjacent parts share no point.
 """
