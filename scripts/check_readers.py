@@ -3,7 +3,8 @@
     pip install '.[readers]'
     python scripts/check_readers.py
 
-One made-up state each in one, two and three dimensions. Exits with 1 if a reader sees another.
+One made-up state each of gas in one, two and three dimensions, and one of a solid and a liquid in
+plane strain. Exits with 1 if a reader sees another.
 """
 
 import sys
@@ -13,98 +14,21 @@ import warnings
 from pathlib import Path
 
 import numpy as np
+from check_readers_states import GASES, expected, is_solid, made_up_gas, made_up_solid
 
-from sph import config, kernels
-from sph.formulations import gas
 from sph.output import checkpoint
-from sph.parts.viscosity import ALPHA, ALPHA_RATE
-from sph.state import State
 
-# Lattice cells along each axis, and the boundary, by dimension. In 1-D the gas is a line of the
-# smoothing length's width, so few cells: it must be wider than a pixel of the slice.
-CASES = {1: (100, "open"), 2: (40, "periodic"), 3: (16, "mirror")}
-# of the gas in one dimension, a liquid; those in two and three are ideal
-P_INF = {1: 0.1, 2: 0.0, 3: 0.0}
-# neither a cube nor beginning at 0
-DOMAIN = [[-0.5, 0.5], [0.25, 0.75], [-1.0, 1.0]]
-PARAMETERS = """
-[problem]
-name = "shock_tube"
-dimension = {dimension}
-domain = {domain}
-boundary = {boundary}
-[physics]
-eos = {eos}
-alpha = {{ min = 0.1, max = 2.0 }}
-"""
+# Fields that solids have besides, as the file and yt name them.
+OF_SOLIDS = {
+    "stress": "StressTensors",
+    "plastic strain": "PlasticStrains",
+    "body": "Bodies",
+    "material": "Materials",
+    "clamped": "Clamped",
+}
 
 
-def made_up(dimension: int) -> checkpoint.Checkpoint:
-    """Cells of a lattice, their density rising along x; memory order other than that of the IDs."""
-    cells, boundary = CASES[dimension]
-    domain = np.array(DOMAIN[:dimension])
-    axes = [low + (high - low) * (np.arange(cells) + 0.5) / cells for low, high in domain]
-    position = np.stack([x.ravel() for x in np.meshgrid(*axes, indexing="ij")])
-    number = position.shape[1]
-    if boundary == "open":
-        position[0, 0] -= 0.125  # one that has left the domain
-    p_inf = P_INF[dimension]
-    liquid = f'{{ name = "stiffened_gas", gamma = 1.4, p_inf = {p_inf} }}'
-    settings = PARAMETERS.format(
-        dimension=dimension, domain=domain.tolist(), boundary=[boundary] * dimension,
-        eos=liquid if p_inf else '{ name = "ideal_gas", gamma = 1.4 }',
-    )  # fmt: skip
-    density = 1.0 + (position[0] - position[0].min())
-    volume = np.prod(domain[:, 1] - domain[:, 0]) / number
-    random = np.random.default_rng(dimension)
-    particles = State.at_start(
-        (*gas.FIELDS, ALPHA, ALPHA_RATE),
-        position=position,
-        velocity=random.normal(size=position.shape),
-        mass=density * volume,
-        internal_energy=1.0 + random.random(number),
-    )
-    particles.alpha[:] = 0.1
-    particles.density[:] = density
-    particles.omega[:] = 1.0
-    state = checkpoint.Checkpoint(
-        particles=particles,
-        time=0.25,
-        step=3,
-        next_step=1e-3,
-        list_position=position,
-        list_support=particles.support,
-        list_skin=0.1,
-        config=config.from_text(settings, "this script"),
-        lineage=(),
-    )
-    kernel = state.config.physics.kernel_model()
-    ratio = kernels.support_ratio(kernel, dimension)
-    particles.support[:] = ratio * 1.6 * ((domain[:, 1] - domain[:, 0]) / cells).max()
-    order = random.permutation(number)
-    state.particles = particles.subset(order)
-    return state
-
-
-def expected(state: checkpoint.Checkpoint) -> dict[str, np.ndarray]:
-    """What a reader must see, in the order of the IDs, in centimetres, grams and seconds."""
-    gas, dimension = state.particles.by_id(), state.particles.dimension
-    ratio = kernels.support_ratio(state.config.physics.kernel_model(), dimension)
-    velocity = np.zeros((gas.number, 3))
-    velocity[:, :dimension] = gas.velocity.T
-    return {
-        "velocity": velocity,
-        "mass": gas.mass,
-        "density": gas.density,
-        "internal energy": gas.internal_energy,
-        "smoothing length": gas.support / ratio,
-        "pressure": (1.4 - 1) * gas.density * gas.internal_energy - 1.4 * P_INF[dimension],
-        "id": gas.id,
-        "position": None,  # compared by `same_positions`, for the box is the file's own
-    }
-
-
-def by_yt(path: Path) -> dict:
+def by_yt(path: Path, solid: bool) -> dict:
     import yt
 
     yt.set_log_level("error")
@@ -123,14 +47,16 @@ def by_yt(path: Path) -> dict:
     side = data.domain_width.to_value("cm")
     middle = data.slice("z", data.domain_center[2])
     image = middle.to_frb(data.domain_width[0], 64, center=data.domain_center)["gas", "density"]
+    # yt knows no unit for these names and leaves them in the file's own
+    names = {"pressure": "Pressures", **(OF_SOLIDS if solid else {})}
+    own = {what: np.asarray(gas["PartType0", name]) for what, name in names.items()}
     return {
+        **own,
         "velocity": field("Velocities", "cm/s"),
         "mass": field("Masses", "g"),
         "density": field("Density", "g/cm**3"),
         "internal energy": field("InternalEnergy", "erg/g"),
         "smoothing length": field("SmoothingLength", "cm"),
-        # yt knows no unit for this name and leaves it in the file's own
-        "pressure": np.asarray(gas["PartType0", "Pressures"]),
         "id": field("ParticleIDs", ""),
         "position": field("Coordinates", "cm"),
         "box": side,
@@ -139,7 +65,7 @@ def by_yt(path: Path) -> dict:
     }
 
 
-def by_pynbody(path: Path) -> dict:
+def by_pynbody(path: Path, solid: bool) -> dict:
     import pynbody
 
     gas = pynbody.load(str(path)).gas
@@ -152,12 +78,15 @@ def by_pynbody(path: Path) -> dict:
         "pressure": ("p", "g cm**-1 s**-2"),
         "position": ("pos", "cm"),
     }
+    if solid:
+        fields |= {what: (name, "1") for what, name in OF_SOLIDS.items()}
+        fields["stress"] = ("StressTensors", "g cm**-1 s**-2")
     seen = {what: np.asarray(gas[name].in_units(unit)) for what, (name, unit) in fields.items()}
     time = float(gas.properties["time"].in_units("s"))
     return {**seen, "id": np.asarray(gas["iord"]), "time": time}
 
 
-def by_swiftsimio(path: Path) -> dict:
+def by_swiftsimio(path: Path, solid: bool) -> dict:
     import swiftsimio
 
     data = swiftsimio.load(str(path))
@@ -171,6 +100,14 @@ def by_swiftsimio(path: Path) -> dict:
         "id": ("particle_ids", "dimensionless"),
         "position": ("coordinates", "cm"),
     }
+    if solid:
+        fields |= {
+            "stress": ("stress_tensors", "dyn/cm**2"),
+            "plastic strain": ("plastic_strains", "dimensionless"),
+            "body": ("bodies", "dimensionless"),
+            "material": ("materials", "dimensionless"),
+            "clamped": ("clamped", "dimensionless"),
+        }
     seen = {
         what: getattr(data.gas, name).to_physical_value(unit)
         for what, (name, unit) in fields.items()
@@ -189,16 +126,21 @@ def problems(state: checkpoint.Checkpoint, seen: dict) -> list[str]:
         wrong = not (
             same_positions(state, seen["position"][order])
             if what == "position"
-            # a few roundings in H/h, the pressure and factors of 1 between units
-            else np.allclose(seen[what][order], right, rtol=1e-14, atol=0)
+            else equal(seen[what][order], right)
         )
         if wrong:
             found.append(what)
     if seen["time"] != state.time:
         found.append("time")
-    if seen.get("adiabatic index", 1.4) != 1.4:
+    if not is_solid(state) and seen.get("adiabatic index", 1.4) != 1.4:
         found.append("adiabatic index")
     return found + problems_of_box(state, seen) + problems_of_slice(state, seen)
+
+
+def equal(seen: np.ndarray, right: np.ndarray) -> bool:
+    """But for a few roundings in H/h, the pressure and factors of 1 between units."""
+    roundings = 1e-15 * np.abs(right).max()
+    return seen.shape == right.shape and np.allclose(seen, right, rtol=1e-14, atol=roundings)
 
 
 def same_positions(state: checkpoint.Checkpoint, position: np.ndarray) -> bool:
@@ -234,7 +176,7 @@ READERS = {"yt": by_yt, "pynbody": by_pynbody, "swiftsimio": by_swiftsimio}
 
 def verdict(reader, state: checkpoint.Checkpoint, path: Path) -> str:
     try:
-        wrong = problems(state, reader(path))
+        wrong = problems(state, reader(path, is_solid(state)))
     except Exception:
         traceback.print_exc()
         return "cannot open it"
@@ -244,18 +186,19 @@ def verdict(reader, state: checkpoint.Checkpoint, path: Path) -> str:
 def main() -> int:
     warnings.filterwarnings("ignore")
     good = True
-    print(f"{'reader':<12}{'1-D':<16}{'2-D':<16}{'3-D':<16}")
+    states = {f"{dimension}-D": made_up_gas(dimension) for dimension in GASES}
+    states["solid"] = made_up_solid()
+    print(f"{'reader':<12}" + "".join(f"{name:<16}" for name in states))
     with tempfile.TemporaryDirectory() as directory:
-        states = {dimension: made_up(dimension) for dimension in CASES}
-        for dimension, state in states.items():
-            checkpoint.write(Path(directory) / f"{dimension}.h5", state)
-        for name, reader in READERS.items():
+        for name, state in states.items():
+            checkpoint.write(Path(directory) / f"{name}.h5", state)
+        for reader, read in READERS.items():
             verdicts = [
-                verdict(reader, state, Path(directory) / f"{dimension}.h5")
-                for dimension, state in states.items()
+                verdict(read, state, Path(directory) / f"{name}.h5")
+                for name, state in states.items()
             ]
             good &= all(each == "as written" for each in verdicts)
-            print(f"{name:<12}" + "".join(f"{each:<16}" for each in verdicts), flush=True)
+            print(f"{reader:<12}" + "".join(f"{each:<16}" for each in verdicts), flush=True)
     return 0 if good else 1
 
 

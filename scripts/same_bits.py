@@ -38,6 +38,7 @@ SMALL = {
     "leblanc": ["problem.n=500"],
     "noh_2d": ["problem.n=4000"],
     "noh_3d": ["problem.n=6000"],
+    "oscillating_plate": ["problem.n=576"],
     "point_explosion": ["problem.n=4096"],
     "point_explosion_2d": ["problem.n=4096"],
     "polytrope": ["problem.n=1000"],

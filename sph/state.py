@@ -29,7 +29,8 @@ class Field(NamedTuple):
 
     rank: 0 for a scalar (N,), 1 for a vector (D, N), 2 for a tensor (D, D, N). A reflecting wall
     changes the sign of a vector's component normal to the wall, and of a tensor's components with
-    one normal and one tangential index.
+    one normal and one tangential index. A tensor has no public name: the directions that the scene
+    lacks are known to the formulation alone (`Formulation.derived`).
     """
 
     name: str

@@ -31,6 +31,9 @@ _IN_PLACE_OF = {
     "physics.strength": ("materials",),
     "physics.materials": ("eos", "gamma", "strength"),
 }
+# A problem's default strength belongs to its default equation of state: a user who gives the
+# equation of state of a liquid must not get a solid.
+_WITHOUT_DEFAULT = {**_IN_PLACE_OF, "physics.strength": ("eos", "gamma", "materials")}
 
 
 class Source(NamedTuple):
@@ -273,11 +276,12 @@ def _fill_defaults(
 
     A default for a key that the formulation does not have is for another formulation.
     """
+    given = {f"{table}.{name}" for table, keys in raw.items() for name in keys}
     for key, value in problem.defaults.items():
         table, name = key.split(".", 1)
         if name not in models[table].model_fields:
             continue
-        if not any(other in raw[table] for other in _IN_PLACE_OF.get(key, ())):
+        if not given & {f"{table}.{other}" for other in _WITHOUT_DEFAULT.get(key, ())}:
             raw[table].setdefault(name, value)
 
 

@@ -12,7 +12,9 @@ from sph.state import Field, Public, State
 NAME = re.compile(r"[a-z][a-z0-9_]{0,60}")
 KEY = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,60}")
 RANKS = (0, 1, 2)
-NOT_PUBLIC = {"Pressures", "Pressure", "Density", "InternalEnergy", "SmoothingLength"}
+NOT_PUBLIC = {
+    "Pressures", "Pressure", "StressTensors", "Density", "InternalEnergy", "SmoothingLength",
+}  # fmt: skip
 # Attributes of a state, and what a checkpoint and the history hold besides the fields of parts.
 NOT_FIELDS = {
     *dir(State), "fields", "time", "step", "next_step", "list_position", "list_support",
@@ -128,6 +130,8 @@ def _check_field(kind: type[Part], field: Field) -> None:
             raise wrong(kind, f"field {field.name!r}: expected public=Public(name, …) of sph.state")
         if name in NOT_PUBLIC:
             raise wrong(kind, f"field {field.name!r}: the public name {name!r} is reserved")
+        if field.rank == 2:
+            raise wrong(kind, f"field {field.name!r}: a tensor has no public name")
 
 
 def _check_restart(part: Part, kind: type[Part]) -> None:

@@ -46,7 +46,8 @@ class Formulation(Part):
     def derived(self, state: State) -> list[tuple[Public, np.ndarray]]:
         """Return public quantities that checkpoints hold besides the stored fields.
 
-        Arrays: (N,), or (D, N) and (3, 3, N) for vectors and tensors. The pressure is the first.
+        Arrays: (N,), or (D, N) and (3, 3, N) for vectors and symmetric tensors. The pressure is the
+        first.
         """
         return [(PRESSURE, self.pressure(state))]
 

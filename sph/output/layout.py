@@ -7,7 +7,7 @@ middle, so that a slice through the middle of the box finds them.
 
 from collections.abc import Callable, Iterator, Mapping
 from functools import partial
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import h5py
 import numpy as np
@@ -16,7 +16,7 @@ from sph import kernels
 from sph.output import hdf5
 from sph.state import Public
 
-# Makes rows of an array (…, n) of a field, or of part of one: (n,), (n, 3) or (n, 3, 3).
+# Makes rows of an array (…, n) of a field, or of part of one: (n,), (n, 3) or (n, 6).
 Rows = Callable[[np.ndarray], np.ndarray]
 
 # Bytes of a chunk, at most: the Fletcher-32 filter works by the chunk, for which HDF5 needs up to
@@ -31,6 +31,11 @@ CENTIMETRE_GRAM_SECOND = {
     "Unit temperature in cgs (U_T)": 1.0,
 }
 
+
+# Columns of a symmetric tensor, SWIFT's: xx, yy, zz, xy, xz, yz. Not (n, 3, 3), which pynbody 2.8
+# refuses to load.
+TENSOR = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
+COLUMNS = (1, 3, len(TENSOR))  # by rank
 
 # Names that yt knows; soft links, since pynbody does not list a field that is hard-linked twice.
 SINGULAR = {
@@ -98,14 +103,14 @@ def write_rows(
     def part(first: int, last: int) -> np.ndarray:
         return in_rows(array[..., first:last])
 
-    longest = LARGEST_CHUNK // (8 * 3 ** (array.ndim - 1))
+    longest = LARGEST_CHUNK // (8 * COLUMNS[array.ndim - 1])
     return hdf5.write_checked(group, name, part, array.shape[-1], longest)
 
 
 def _fields(checkpoint, frame: Frame) -> Iterator[tuple[Public, np.ndarray, Rows]]:
     """Each public field: its array, and what makes rows of it.
 
-    Rows are scalars (N,), vectors (N, 3) and tensors (N, 3, 3).
+    Rows are scalars (N,), vectors (N, 3) and symmetric tensors (N, 6).
     """
     config, particles = checkpoint.config, checkpoint.particles
     ratio = kernels.support_ratio(config.physics.kernel_model(), particles.dimension)
@@ -115,23 +120,29 @@ def _fields(checkpoint, frame: Frame) -> Iterator[tuple[Public, np.ndarray, Rows
     }
     for field in particles.fields:
         if field.public is not None and field.stored:
-            usual = _in_three_dimensions if field.rank else _unchanged
-            rows: Any = special.get(field.name, usual)
+            rows = special.get(field.name, USUAL[field.rank])
             yield field.public, getattr(particles, field.name), rows
     for public, array in checkpoint.scene.formulation.derived(particles):
-        yield public, array, _in_three_dimensions if array.ndim > 1 else _unchanged
+        yield public, array, USUAL[array.ndim - 1]
 
 
-def _unchanged(array: np.ndarray) -> np.ndarray:
+def _scalar(array: np.ndarray) -> np.ndarray:
     return array
 
 
-def _in_three_dimensions(array: np.ndarray) -> np.ndarray:
-    """(N, 3) of a vector (D, N), or (N, 3, 3) of a tensor (D, D, N): zero along unused axes."""
-    *ranks, n = array.shape
-    found = np.zeros((n, *(3 for _ in ranks)))
-    found[(slice(None), *(slice(length) for length in ranks))] = np.moveaxis(array, -1, 0)
+def _vector(array: np.ndarray) -> np.ndarray:
+    """(N, 3) of (D, N): zero along unused axes."""
+    found = np.zeros((array.shape[1], 3))
+    found[:, : array.shape[0]] = array.T
     return found
+
+
+def _tensor(array: np.ndarray) -> np.ndarray:
+    """(N, 6) of a symmetric (3, 3, N)."""
+    return np.stack([array[a, b] for a, b in TENSOR], axis=1)
+
+
+USUAL: tuple[Rows, ...] = (_scalar, _vector, _tensor)  # by rank
 
 
 def _header(checkpoint, frame: Frame) -> dict[str, Mapping]:

@@ -23,19 +23,18 @@ def figures(outcome) -> dict[str, float]:
 # --- the bar ----------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(
-    ("dimension", "n", "radius_error"),
-    # Finite elements give 0.811 and 0.8124 of the length, within 3 % of which the program is to be
-    # at any resolution. The foot is thinner than 10 spacings: 2 and 5 % were measured.
-    [(2, 340, 0.08), (3, 700, 0.08)],
-)
-def test_bar_is_shortened_as_by_finite_elements(run, dimension, n, radius_error):
-    outcome = run("taylor_bar", f"problem.dimension={dimension}", f"problem.n={n}")
+@pytest.mark.parametrize(("dimension", "length"), [(2, 0.8254), (3, 0.8336)])
+def test_bar_is_shortened_as_by_finite_elements(run, dimension, length):
+    outcome = run("taylor_bar", f"problem.dimension={dimension}", "problem.n=340")
     found = figures(outcome)
+    # Finite elements give 0.811 and 0.8124 of the length, 2.52 and 1.79 of the radius. 340
+    # particles, 3 to 5 spacings to a radius, are 1.8 and 2.6 % longer and 10 % thinner.
     assert found["length_error"] < 0.03
-    assert found["radius_error"] < radius_error
+    # as measured: a sixth less yield stress gives 0.798 in 2-D
+    assert found["shortest_length_ratio"] == pytest.approx(length, abs=0.006)
+    assert found["radius_error"] < 0.12
     assert outcome.energy_drift < 1e-3  # of the kinetic energy, which all becomes heat
-    # it has stopped: at 200 m/s the kinetic energy is 80 times that of elastic vibrations
+    # it has stopped: vibrations have 0.1 % of the kinetic energy
     assert outcome.simulation.totals.kinetic_energy < 0.01 * outcome.energies[0]
     assert not torn(outcome)
 
@@ -66,7 +65,7 @@ def test_rings_break_without_tensile_correction(run):
 
 # --- several bodies ---------------------------------------------------------------------------
 
-FEW = ("problem.n=600", "time.end=6e-6")
+FEW = ("problem.n=600", "time.end=1e-5")
 
 
 def test_disc_hands_its_momentum_to_plate_of_another_material(run):
@@ -74,13 +73,13 @@ def test_disc_hands_its_momentum_to_plate_of_another_material(run):
     start, end = outcome.momenta[0], outcome.momenta[-1]
     assert np.abs(end - start).max() < 1e-12 * np.abs(start).max()  # round-off
     found = outcome.report()
-    assert found["body_0_velocity_x"] < 780.0  # of 800
+    assert found["body_0_velocity_x"] < 380.0  # of 400
     mass = np.array([7850.0 * np.pi * 0.005**2, 2785.0 * 0.004 * 0.04])
     gained = found["body_1_velocity_x"] * mass[1]
-    assert gained == pytest.approx((800.0 - found["body_0_velocity_x"]) * mass[0], rel=1e-9)
+    assert gained == pytest.approx((400.0 - found["body_0_velocity_x"]) * mass[0], rel=1e-9)
     p = outcome.particles
     plate = p.material == 1.0
-    # equal pressure behind the shocks into both gives 525 m/s, a free surface twice as much
-    assert 525.0 < p.velocity[0, plate].max() < 1050.0
+    # equal pressure behind the shocks into both gives 262 m/s, a free surface twice as much
+    assert 262.0 < p.velocity[0, plate].max() < 524.0
     assert p.plastic_strain[plate].max() > 0.05
     assert outcome.energy_drift < 1e-3

@@ -252,6 +252,14 @@ def deviatoric_rate(velocity_gradient, shear_modulus):
     return 2 * shear_modulus * (rate - np.trace(rate) / 3 * np.eye(d)[:, :, None])
 
 
+def equivalent_rate(velocity_gradient):
+    """(N,) (2/3 e : e)^(1/2), e the deviator of the strain rate in three dimensions."""
+    rate, d = strain_rate(velocity_gradient), len(velocity_gradient)
+    mean = np.trace(rate) / 3
+    e = rate - mean * np.eye(d)[:, :, None]
+    return np.sqrt(2 / 3 * ((e**2).sum(axis=(0, 1)) + (3 - d) * mean**2))
+
+
 def approach_speed(pairs, matter):
     """(P,) mu_ij without the switch: negative where particles approach, else zero."""
     h_ij = 0.5 * pairs.support  # (d_i + d_j)/2
@@ -325,6 +333,15 @@ def forces(scene, pairs, slopes, matter, volume, state):
     }
 
 
+def velocity_gradient(scene: Scene, matter: Matter) -> np.ndarray:
+    """(D, D, N) L, which needs no stress."""
+    volume = matter.mass / matter.density
+    lengths = scene.lengths(matter.mass, matter.density)
+    pairs = pairs_of(scene, matter.position, 2 * lengths)
+    slopes = gradients_of(scene, pairs, correction_of(scene, pairs, volume))
+    return flow(scene, pairs, slopes, matter, volume, lengths)["velocity_gradient"]
+
+
 def rates(scene: Scene, matter: Matter) -> Rates:
     """Every rate of the scheme at the state of the particles."""
     volume = matter.mass / matter.density
@@ -368,7 +385,8 @@ class Law(NamedTuple):
 class Body:
     """Corrected values at one time, and the rates of the last evaluation.
 
-    `law(density, energy, deviator)` returns a Law.
+    `law(density, energy, deviator, rate, plastic_strain)`, with the equivalent rate of strain,
+    returns a Law.
     """
 
     scene: Scene
@@ -386,12 +404,12 @@ class Body:
 
     def evaluate(self, velocity, density, energy, deviator):
         """Rates at the present position and the predicted values."""
-        now = self.law(density, energy, deviator)
-        unit = np.eye(len(velocity))[:, :, None]
-        stress = now.deviator - now.pressure * unit
-        matter = Matter(
-            self.position, velocity, self.mass, density, stress, now.sound_speed, self.rest_density
-        )
+        at_rest = np.zeros_like(deviator), np.ones_like(density)
+        matter = Matter(self.position, velocity, self.mass, density, *at_rest, self.rest_density)
+        rate = equivalent_rate(velocity_gradient(self.scene, matter))
+        now = self.law(density, energy, deviator, rate, self.plastic_strain)
+        stress = now.deviator - now.pressure * np.eye(len(velocity))[:, :, None]
+        matter = matter._replace(stress=stress, sound_speed=now.sound_speed)
         self.rates, self.shear_modulus = rates(self.scene, matter), now.shear_modulus
 
     def start(self):
@@ -423,7 +441,8 @@ class Body:
         self.energy = self.energy + new.energy_rate * half
         change = half * deviatoric_rate(new.velocity_gradient, self.shear_modulus)
         trial = turned(self.deviator, new.velocity_gradient, half) + change
-        now = self.law(self.density, self.energy, trial)
+        rate = equivalent_rate(new.velocity_gradient)
+        now = self.law(self.density, self.energy, trial, rate, self.plastic_strain)
         self.deviator = now.deviator
         self.plastic_strain = self.plastic_strain + now.plastic_strain
 

@@ -364,7 +364,7 @@ def elastic_body(dimension, order=1):
     matter = random_solid(dimension)
     n = len(matter.mass)
 
-    def law(density, energy, deviator):
+    def law(density, energy, deviator, rate, plastic_strain):
         c = np.ones(n)
         p = density - matter.density  # each particle is at rest with its own density
         return continuum.Law(
@@ -401,6 +401,17 @@ def test_step_is_of_second_order(dimension):
     # 3: of the fourfold fall of order two; order one would give 2
     assert coarse > 3 * fine
     assert abs(ends[16][-1]) < abs(ends[4][-1]) / 8
+
+
+def test_equivalent_rate_of_simple_shear_and_uniaxial_strain():
+    """Shear at a rate g has g/sqrt(3), uniaxial strain at e 2e/3, in every number of dimensions."""
+    shear = np.zeros((2, 2, 1))
+    shear[0, 1] = 1.5
+    np.testing.assert_allclose(continuum.equivalent_rate(shear), 1.5 / np.sqrt(3), rtol=1e-15)
+    for dimension in DIMENSIONS:
+        L = np.zeros((dimension, dimension, 1))
+        L[0, 0] = 0.9
+        np.testing.assert_allclose(continuum.equivalent_rate(L), 0.6, rtol=1e-15)
 
 
 def test_turned_keeps_principal_values_and_follows_the_body():

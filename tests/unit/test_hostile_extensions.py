@@ -201,6 +201,10 @@ BROKEN_PARTS = {
         with_body('fields = (Field("a", public=Public("Density", 0, 0, 0, 0, "")),)'),
         "'Density' is reserved",
     ),
+    "a public tensor": (
+        with_body('fields = (Field("a", rank=2, public=Public("A", 0, 0, 0, 0, "")),)'),
+        "'a': a tensor has no public name",
+    ),
     "a stage": (
         with_pass('"later", "x", print, (), ()'),
         "stage 'later': expected one of prediction, density",

@@ -114,8 +114,8 @@ def test_lattice_for_other_dimension_is_refused_with_alternative():
     for kind, dimension in (("hexagonal", 3), ("hexagonal", 1), ("bcc", 2), ("bcc", 1)):
         with pytest.raises(ValueError, match=r'expected "cubic"'):
             lattice.fill(np.array([[0.0, 1.0]] * dimension), 100, kind)
-    with pytest.raises(ValueError, match='lattice "fcc": expected'):
-        lattice.unit_cell("fcc", 3)
+    with pytest.raises(ValueError, match='lattice "hcp": expected'):
+        lattice.unit_cell("hcp", 3)
 
 
 @pytest.mark.parametrize(("dimension", "nearest"), [(1, 0.95), (2, 0.8), (3, 0.8)])

@@ -198,3 +198,12 @@ def test_oscillation_too_short_is_not_fitted(end):
     assert oscillation.fit(time, np.cos(2.0 * time), 2.0) is None
     longer = np.linspace(0.0, 1.6 * np.pi, 100)
     assert oscillation.fit(longer, np.cos(2.0 * longer), 2.1).period == pytest.approx(np.pi)
+
+
+@pytest.mark.parametrize("size", [1e-9, 1.0, 1e9])
+def test_fit_does_not_depend_on_units(size):
+    time = np.linspace(0.0, 2.0 * np.pi, 400)
+    value = size * np.exp(-0.05 * time) * np.sin(2.0 * time)
+    found = oscillation.fit(time, value, 2.1)
+    assert found.frequency == pytest.approx(2.0, rel=1e-6)
+    assert found.damping == pytest.approx(0.05, rel=1e-4)

@@ -79,6 +79,20 @@ interval = 10.0
 name = "noh"
 n = 50
 """,
+    # a plate whose end is as fast as sound
+    "torn": """
+[problem]
+name = "oscillating_plate"
+n = 250
+tip_velocity = 100.0
+[physics]
+allow_tearing = true
+max_energy_drift = 1.0
+[time]
+end = 0.004
+[output]
+interval = 0.004
+""",
     # a wave of amplitude 1e-6 on a glass, whose noise is a hundred times as large
     "swamped": """
 [problem]
@@ -183,6 +197,7 @@ class FakeSimulation:
         self.max_support, self.number = 0.125, 40
         self.scene = self.config = self.problem = self.particles = self.run = self
         self.precision = precision
+        self.formulation, self.neighbours_key = self, "physics.eta"
         self.inexact_momentum = inexact
         self.swamped = swamped or {}
         self.allowed = lambda: limits or {}

@@ -6,12 +6,10 @@ from sph.integrators.leapfrog import DENSITY, STRAIGHT
 from sph.part import Evolved
 from sph.state import COMMON, Field, Public
 
-DEVIATOR = Field(
-    "deviatoric_stress",
-    rank=2,
-    public=Public("DeviatoricStressTensors", -1, 1, -2, -5, "Deviator of the stress tensor"),
-)
-STRESS = Public("StressTensors", -1, 1, -2, -5, "Stress tensor, positive in tension")
+STRESS = Public(
+    "StressTensors", -1, 1, -2, -5,
+    "Stress tensor, positive in tension: columns xx, yy, zz, xy, xz, yz",
+)  # fmt: skip
 PLASTIC_STRAIN = Field(
     "plastic_strain",
     at_least=0.0,
@@ -46,7 +44,8 @@ def of(scheme) -> tuple[Field, ...]:
     found += [CLAMPED] * scheme.is_clamped
     if not scheme.is_solid:
         return (*found, Field("pressure", stored=False))
-    found += [DEVIATOR, Field("stress_rate", rank=2), pieces.BODY]
+    # no public name: the stress tensor and the pressure tell it, in all three directions
+    found += [Field("deviatoric_stress", rank=2), Field("stress_rate", rank=2), pieces.BODY]
     found += [Field("predicted_stress", rank=2, stored=False)]
     found += [Field("stress", rank=2, stored=False)]
     found += [PLASTIC_STRAIN] * scheme.yields

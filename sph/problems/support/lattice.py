@@ -33,7 +33,9 @@ def unit_cell(kind: str, dimension: int) -> Cell:
         return Cell((1.0,) * dimension, ((0.5,) * dimension,))
     own_dimension = {"hexagonal": 2, "bcc": 3, "fcc": 3}.get(kind)
     if own_dimension is None:
-        raise ValueError(f'lattice "{kind}": expected "cubic", "hexagonal" (2-D) or "bcc" (3-D)')
+        raise ValueError(
+            f'lattice "{kind}": expected "cubic", "hexagonal" (2-D), "bcc" or "fcc" (3-D)'
+        )
     if dimension != own_dimension:
         instead = {2: '"cubic" or "hexagonal"', 3: '"cubic" or "bcc"'}.get(dimension, '"cubic"')
         raise ValueError(

@@ -29,6 +29,7 @@ def fit(time: np.ndarray, value: np.ndarray, guess: float) -> Oscillation | None
     since = time - time[0] if time.size else time
     if time.size < 6 or since[-1] * guess < 3.0 * np.pi:
         return None
+    value = value / (np.abs(value).max() or 1.0)  # the fit stops at an absolute accuracy
     weight = np.sqrt(np.gradient(since))
 
     def misfit(unknown):

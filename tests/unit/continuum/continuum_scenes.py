@@ -24,6 +24,14 @@ PLASTIC = {
     "eos": {"name": "tait", "rho_0": 1.1, "c_0": 1.7},
     "strength": {"name": "elastic_plastic", "shear_modulus": 1.3, "yield_stress": 1.1},
 }
+JOHNSON_COOK = {
+    "eos": {"name": "tait", "rho_0": 1.0, "c_0": 1.4},
+    "strength": {
+        "name": "johnson_cook", "shear_modulus": 0.9, "A": 0.2, "B": 0.5, "n": 0.4, "C": 0.1,
+        "m": 0.8, "reference_rate": 0.5, "specific_heat": 1.0, "room_temperature": 0.5,
+        "melting_temperature": 4.0,
+    },
+}  # fmt: skip
 
 
 class EagerTeam(Team):
@@ -65,7 +73,9 @@ class Case:
 
     @property
     def yields(self):
-        return any(one.get("strength", {}).get("yield_stress") for one in self.materials)
+        return any(
+            one.get("strength", {}).get("name", "elastic") != "elastic" for one in self.materials
+        )
 
     @property
     def spacing_ratio(self):
@@ -120,32 +130,47 @@ def equivalent_stress(deviator):
     return np.sqrt(1.5 * squares)
 
 
-def on_yield_surface(material, deviator):
-    """(D, D, N) S scaled down so that its equivalent stress is at most Y."""
-    limit = material.get("strength", {}).get("yield_stress")
-    if limit is None:
-        return deviator
-    equivalent = equivalent_stress(deviator)
-    return deviator * np.where(equivalent > limit, limit / np.maximum(equivalent, limit), 1.0)
+def yield_stress(strength, plastic_strain, rate, energy):
+    """(N,) Y of perfect plasticity, or of Johnson & Cook (1983); inf without a yield stress."""
+    if strength["name"] != "johnson_cook":
+        return np.full(energy.size, strength.get("yield_stress", np.inf))
+    s = strength
+    warm = energy / s["specific_heat"] / (s["melting_temperature"] - s["room_temperature"])
+    hardened = s["A"] + s["B"] * plastic_strain ** s["n"]
+    by_rate = 1 + s["C"] * np.log(np.maximum(rate / s["reference_rate"], 1.0))
+    return hardened * by_rate * (1 - np.clip(warm, 0, 1) ** s["m"])
+
+
+def plastic_flow(strength, equivalent, plastic_strain, rate, energy):
+    """(N,) increment x of the plastic strain: S_eq - 3 G x = Y(strain + x) where S_eq > Y."""
+    low, high = np.zeros_like(equivalent), equivalent / (3 * strength["shear_modulus"])
+    for _ in range(60):  # bisection, to the last bit
+        x = 0.5 * (low + high)
+        left = equivalent - 3 * strength["shear_modulus"] * x
+        above = left > yield_stress(strength, plastic_strain + x, rate, energy)
+        low, high = np.where(above, x, low), np.where(above, high, x)
+    flows = equivalent > yield_stress(strength, plastic_strain, rate, energy)
+    return np.where(flows, 0.5 * (low + high), 0.0)
 
 
 def law_of(materials, index):
-    """A `continuum.Law` of density, energy and trial deviator; index (N,) of the materials."""
+    """A `law` of `continuum.Body`; index (N,) of the particles' materials."""
 
-    def law(density, energy, deviator):
+    def law(density, energy, deviator, rate, plastic_strain):
         n = density.size
-        pressure, sound, G, returned = np.empty(n), np.empty(n), np.empty(n), deviator.copy()
-        plastic = np.zeros(n)
+        pressure, sound, G, plastic = np.empty(n), np.empty(n), np.empty(n), np.zeros(n)
+        equivalent = equivalent_stress(deviator)
         for k, one in enumerate(materials):
             its = index == k
             pressure[its], sound[its], _ = pressure_of(one, density[its], energy[its])
             G[its] = shear_modulus(one)
-            returned[:, :, its] = on_yield_surface(one, deviator[:, :, its])
-        solid = G > 0
-        lost = equivalent_stress(deviator) - equivalent_stress(returned)
-        plastic[solid] = lost[solid] / (3 * G[solid])
+            if "strength" in one:
+                plastic[its] = plastic_flow(
+                    one["strength"], equivalent[its], plastic_strain[its], rate[its], energy[its]
+                )
+        factor = 1 - 3 * G * plastic / np.where(equivalent > 0, equivalent, 1.0)
         sound = np.sqrt(sound**2 + 4 / 3 * G / density)  # of longitudinal waves
-        return continuum.Law(pressure, sound, G, returned, plastic)
+        return continuum.Law(pressure, sound, G, factor * deviator, plastic)
 
     return law
 

@@ -9,6 +9,7 @@ import pytest
 from continuum_scenes import (
     ELASTIC,
     GAS,
+    JOHNSON_COOK,
     MIRROR,
     OPEN,
     PERIODIC,
@@ -91,6 +92,7 @@ TRAJECTORIES = [
     (Case((MIRROR, MIRROR), -1, (GAS, WATER)), 0.2),
     (Case((OPEN, MIRROR, PERIODIC), 1, (ELASTIC, PLASTIC), tensile=0.3), 0.3),
     (Case((MIRROR, MIRROR, MIRROR), 0, (PLASTIC,)), 0.3),
+    (Case((MIRROR, PERIODIC), 1, (JOHNSON_COOK,)), 0.2),
 ]
 
 

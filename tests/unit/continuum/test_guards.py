@@ -15,13 +15,15 @@ SOLID = """
 name = "uniform"
 n = 100
 dimension = 2
+density = 1.0
+pressure = 0.01
 boundary = "open"
 [time]
 end = 0.5
 [physics]
 formulation = "continuum"
 max_energy_drift = 1.0
-eos = { name = "tait", rho_0 = 1.0, c_0 = 1.0 }
+eos = { name = "tait", rho_0 = 0.99, c_0 = 1.0 }
 strength = { name = "elastic_plastic", shear_modulus = 0.5, yield_stress = 0.01 }
 """
 
@@ -109,19 +111,23 @@ def test_internal_energy_may_be_negative():
         ("time.stepping=individual", 'expected "global"'),
         ("physics.correction=2", "expected -1, 0 or 1"),
         ("physics.q_a=-1.0", "expected a number of at least 0"),
-        ("physics.spacing_ratio=0.0", "expected a number greater than 0"),
+        ("physics.spacing_ratio=0.5", "expected a number of at least 0.9"),
         ("physics.strength.shear_modulus=-1.0", "expected a number greater than 0"),
         ("physics.eta=1.6", "physics.eta is not a key"),
-        (
-            'physics.materials={ a = { eos = { name = "tait", rho_0 = 1.0, c_0 = 1.0 } } }',
-            "expected it in the tables of physics.materials",
-        ),
     ],
 )
 def test_settings_that_do_not_fit_are_refused(setting, words):
     with pytest.raises(ConfigError) as caught:
         config.from_text(SOLID).override([setting])
     assert words in str(caught.value)
+
+
+def test_materials_beside_a_single_material_are_refused():
+    one = '[physics.materials.a]\neos = { name = "tait", rho_0 = 1.0, c_0 = 1.0 }\n'
+    with pytest.raises(ConfigError) as caught:
+        config.from_text(SOLID + one)
+    # of eos and of strength
+    assert str(caught.value).count("expected it in the tables of physics.materials") == 2
 
 
 def test_problem_without_density_is_refused():

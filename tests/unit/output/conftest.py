@@ -1,10 +1,12 @@
 """A state made of random numbers, which no code has rounded or tidied."""
 
+import h5py
 import numpy as np
 import pytest
 from states import gas_state
 
 from sph import config
+from sph.output import checkpoint
 from sph.output.checkpoint import Checkpoint
 from sph.totals import Baseline, Budget
 
@@ -59,3 +61,18 @@ def random_state(dimension=2, number=50, boundary="periodic", alpha=None, seed=1
 @pytest.fixture
 def make_state():
     return random_state
+
+
+@pytest.fixture
+def public(tmp_path):
+    """Write a state and open what was written."""
+    files = []
+
+    def write(state):
+        checkpoint.write(tmp_path / "a.h5", state)
+        files.append(h5py.File(tmp_path / "a.h5"))
+        return files[-1]
+
+    yield write
+    for file in files:
+        file.close()

@@ -6,8 +6,6 @@ import h5py
 import numpy as np
 import pytest
 
-from sph.output import checkpoint
-
 UNITS = {
     f"Unit {what} in cgs ({symbol})"
     for what, symbol in [
@@ -28,21 +26,6 @@ FIELDS = {
     "Pressures",
     "ParticleIDs",
 }
-
-
-@pytest.fixture
-def public(tmp_path):
-    """Write a state and open what was written."""
-    files = []
-
-    def write(state):
-        checkpoint.write(tmp_path / "a.h5", state)
-        files.append(h5py.File(tmp_path / "a.h5"))
-        return files[-1]
-
-    yield write
-    for file in files:
-        file.close()
 
 
 @pytest.mark.parametrize("dimension", [1, 2, 3])
