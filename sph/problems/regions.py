@@ -4,14 +4,13 @@ from functools import cached_property
 from typing import Annotated, ClassVar, Literal, NamedTuple
 
 import numpy as np
-from pydantic import Field, PrivateAttr, model_validator
+from pydantic import Field, model_validator
 
-from sph.domain import Domain
 from sph.errors import ConfigError
 from sph.problems import _relax, base
 from sph.problems._region import Path, Region, Value, formula
 from sph.problems.base import Fault
-from sph.problems.support import areas, bodies, glass, lattice
+from sph.problems.support import areas, bodies
 from sph.problems.support.expressions import Expression
 
 _SHARED = base.Problem.model_fields
@@ -33,7 +32,7 @@ class Placed(NamedTuple):
     members: np.ndarray | None = None  # (R, N) which belong to each region; None: those inside
 
 
-class Problem(base.Problem):
+class Problem(_relax.Relaxable):
     """Gas in regions, of which later ones cover earlier ones. No exact solution is known."""
 
     defaults: ClassVar = {
@@ -76,13 +75,6 @@ class Problem(base.Problem):
         min_length=1,
         description="the regions, one table [[problem.region]] each; later ones cover earlier ones",
     )
-    relax: _relax.Relax | None = Field(
-        default=None,
-        description="relaxation to a glass before the run; not done if not given",
-        examples=[{"residual": 1e-3}],
-    )
-
-    _sums: glass.Smoothing | None = PrivateAttr(default=None)
 
     @model_validator(mode="after")
     def _regions_fit(self):
@@ -109,7 +101,7 @@ class Problem(base.Problem):
     def _unplaceable(self) -> list[Fault]:
         """Return faults of keys that do not go together."""
         if self.relax is not None:
-            return _relax.opens(self.boundaries)
+            return []
         return [
             Fault(
                 ("region", i, "density"),
@@ -214,12 +206,6 @@ class Problem(base.Problem):
 
     # --- particles
 
-    def under(self, physics):
-        """Return the problem with the density sum of the run, which relaxation makes uniform."""
-        copy = self.model_copy()
-        copy._sums = _relax.smoothing(physics, self.dimension)
-        return copy
-
     def fills_box(self, eos) -> bool:
         """Return False: regions may leave a vacuum, or open one as they move."""
         return False
@@ -241,10 +227,7 @@ class Problem(base.Problem):
         position, cell = self._even()
         if self.masses == "equal":
             return self._equal_masses()
-        if self.relax is None:
-            return Placed(position, cell)
-        start = lattice.with_noise(position, self.box, 0.5, self.relax.seed)
-        return Placed(self._relaxed(start, lambda x: np.full(x.shape[1], cell)), cell)
+        return Placed(self.on_glass(position), cell)
 
     def _equal_masses(self) -> Placed:
         position, cell = self._even()
@@ -254,7 +237,7 @@ class Problem(base.Problem):
         start, each = areas.sampled(self.box, position.shape[1], self._density, self.relax.seed)
         # a particle that crosses an edge keeps its volume, else the regions would change in size
         members = self._members(start)
-        found = self._relaxed(start, lambda x: each / self._density(x, members))
+        found = self.relaxed(start, lambda x: each / self._density(x, members))
         return Placed(found, np.full(found.shape[1], each), members)
 
     def _separate_lattices(self, each: float) -> Placed:
@@ -271,12 +254,6 @@ class Problem(base.Problem):
             positions.append(position)
             masses.append(np.full(position.shape[1], region.density * cell))
         return Placed(np.hstack(positions), np.concatenate(masses))
-
-    def _relaxed(self, position: np.ndarray, volume) -> np.ndarray:
-        assert self.relax is not None
-        sums = self._sums or _relax.usual_smoothing(self.dimension)
-        domain = Domain(self.box, self.boundaries)
-        return _relax.relaxed(self.relax, position, domain, volume, sums)
 
 
 def _wrong(path: Path, value: Value, found: np.ndarray, position: np.ndarray) -> str | None:

@@ -4,18 +4,17 @@ import math
 from typing import Annotated, ClassVar, Literal
 
 import numpy as np
-from pydantic import Field, PrivateAttr, field_validator, model_validator
+from pydantic import Field, field_validator
 
-from sph.domain import Domain
 from sph.exact import riemann
 from sph.problems import _relax, base
-from sph.problems.support import boundary_waves, glass
+from sph.problems.support import boundary_waves
 from sph.problems.support import lattice as placement
 
 _SHARED = base.Problem.model_fields
 
 
-class Problem(base.Problem):
+class Problem(_relax.Relaxable):
     """Uniform gas at rest or in uniform motion: a steady-state test."""
 
     defaults: ClassVar = {
@@ -56,14 +55,6 @@ class Problem(base.Problem):
         description="seed of random numbers, for noise and for relaxed or random positions",
     )
 
-    relax: _relax.Relax | None = Field(
-        default=None,
-        description="relaxation to a glass before the run; not done if not given",
-        examples=[{"residual": 1e-3}],
-    )
-
-    _sums: glass.Smoothing | None = PrivateAttr(default=None)
-
     @field_validator("velocity")
     @classmethod
     def _one_per_axis(cls, velocity, known):
@@ -77,18 +68,6 @@ class Problem(base.Problem):
     def _exists(cls, kind, known):
         return placement.checked(kind, known.data.get("dimension"))
 
-    @model_validator(mode="after")
-    def _can_relax(self):
-        if self.relax is not None and (faults := _relax.opens(self.boundaries)):
-            raise base.refused(faults)
-        return self
-
-    def under(self, physics):
-        """Return the problem with the density sum of the run, which relaxation makes uniform."""
-        copy = self.model_copy()
-        copy._sums = _relax.smoothing(physics, self.dimension)
-        return copy
-
     def allowed(self) -> dict[str, base.Limit]:
         """Return the limits: without a lattice, particles move until they have settled."""
         if self.noise == 0.0 and self.lattice not in ("relaxed", "random") and self.relax is None:
@@ -99,22 +78,12 @@ class Problem(base.Problem):
         position = placement.fill(self.box, self.n, self.lattice, self.seed)
         if self.noise:
             position = placement.with_noise(position, self.box, self.noise, self.seed)
-        if self.relax is not None:
-            position = self._relaxed(self.relax, position)
+        position = self.on_glass(position)
         n = position.shape[1]
         volume = np.prod(self.box[:, 1] - self.box[:, 0])
         state = self.exact(eos, 0.0, position)
         mass = np.full(n, self.density * volume / n)
         return base.InitialState(position, state["velocity"], mass, state["internal_energy"])
-
-    def _relaxed(self, keys: _relax.Relax, position: np.ndarray) -> np.ndarray:
-        """Return relaxed positions; those of a lattice are first spread at random in the cells."""
-        if not self.noise and self.lattice not in ("relaxed", "random"):
-            position = placement.with_noise(position, self.box, 0.5, keys.seed)
-        each = float(np.prod(self.box[:, 1] - self.box[:, 0])) / position.shape[1]
-        sums = self._sums or _relax.usual_smoothing(self.dimension)
-        domain = Domain(self.box, self.boundaries)
-        return _relax.relaxed(keys, position, domain, lambda x: np.full(x.shape[1], each), sums)
 
     def exact(self, eos, time: float, position: np.ndarray) -> dict[str, np.ndarray]:
         """Return the uniform state at (D, N) positions, which is steady."""
