@@ -1,10 +1,10 @@
 """Relaxation of particles to a glass: a disordered arrangement whose densities are uniform.
 
-The volume V of each particle is given. In a good arrangement the sum of V_j W(x_i - x_j, H_i) over
-particles, the *filling* of particle i, is the same everywhere: the density that SPH sums is then
-that of the scene. Two stages lead there. Repulsion, as in Diehl et al. (2015), arXiv:1211.0525,
-spreads the particles. Descent along the gradient of the scatter of the filling, with the step sizes
-of Barzilai & Borwein (1988), IMA J. Numer. Anal. 8, 141, then removes what repulsion leaves.
+The volume of each particle is given. In a good arrangement the *filling* (eq 460) is the same for
+all particles: the density that SPH sums is then that of the scene. Two stages lead there. Repulsion
+(Diehl et al. 2015, PASA 32, e048) spreads the particles. Descent along the gradient of the scatter
+of the filling, with the step sizes of Barzilai & Borwein (1988), IMA J. Numer. Anal. 8, 141, then
+removes what repulsion leaves.
 """
 
 from collections.abc import Callable, Iterator
@@ -26,7 +26,7 @@ class Reached(NamedTuple):
     """The end of a relaxation."""
 
     position: np.ndarray  # (D, N)
-    scatter: float  # rms of filling over its mean, minus 1
+    scatter: float  # density error (eq 461): rms of filling over its mean, minus 1
     mean: float  # of the filling; 1 but for the bias of the kernel
     iterations: int
 
@@ -85,14 +85,14 @@ def measured(position, domain: Domain, volume, smoothing: Smoothing) -> Reached:
 
 
 def _moments(filling: np.ndarray, volume: np.ndarray) -> tuple[float, float]:
-    """Return the mean, and the rms deviation relative to the mean."""
+    """Return the mean, and the rms deviation relative to the mean (eq 461)."""
     mean = float((volume * filling).sum() / volume.sum())
     variance = (volume * (filling - mean) ** 2).sum() / volume.sum()
     return mean, float(np.sqrt(variance)) / mean
 
 
 def _descended(start: Reached, domain, volume, smoothing, residual, most, told) -> Reached:
-    """Return the end of the second stage, with the positions of least scatter."""
+    """Return the end of the second stage (eq 463), with the positions of least scatter."""
     position, best, before, step = start.position.copy(), start, None, np.inf
     for count in range(start.iterations + 1, most + 1):
         sizes = volume(position)
@@ -115,7 +115,7 @@ def _descended(start: Reached, domain, volume, smoothing, residual, most, told) 
 
 
 def _push(position: np.ndarray, domain: Domain, volume: np.ndarray) -> np.ndarray:
-    """Return displacements (D, N) by repulsion of near particles."""
+    """Return displacements (D, N) by repulsion of near particles (eq 462)."""
     side = volume ** (1.0 / len(position))
     found = np.zeros_like(position)
     for near in _pairs(position, domain, REACH * side):
@@ -126,7 +126,7 @@ def _push(position: np.ndarray, domain: Domain, volume: np.ndarray) -> np.ndarra
 
 
 def _filling(position, domain: Domain, volume, smoothing: Smoothing) -> np.ndarray:
-    """Return the filling (N,) of particles with volumes (N,)."""
+    """Return the filling (N,) of particles with volumes (N,) (eq 460)."""
     dim = (0,) * len(position)
     kernel, norm = smoothing.kernel, kernels.normalisation(smoothing.kernel, dim)
     support = smoothing.ratio * volume ** (1.0 / len(dim))
