@@ -188,6 +188,9 @@ def resolve(
         models["physics"] = physics.chosen(raw["physics"])
         _fill_defaults(raw, problem, models)
         _fill_tables(raw["problem"], source, problem)
+        _make_paths_absolute(raw["problem"], source, problem)
+        raw["problem"], faults = problem.filled(raw["problem"])
+        issues += [Issue(("problem", *fault.path), fault.text) for fault in faults]
         issues += checks.shape_issues(raw["problem"], problem)
     issues += not_finite(raw)
     found = {}
@@ -288,6 +291,15 @@ def _fill_defaults(
             continue
         if not given & {f"{table}.{other}" for other in _WITHOUT_DEFAULT.get(key, ())}:
             raw[table].setdefault(name, value)
+
+
+def _make_paths_absolute(raw: dict[str, Any], source: Source, problem: type[Problem]) -> None:
+    """Let paths in the file begin at its directory, and those of --set at the current one."""
+    for key in problem.paths:
+        if isinstance(path := raw.get(key), str) and path:
+            is_in_file = isinstance(source.places.get(("problem", key)), int)
+            start = source.directory if is_in_file else ""
+            raw[key] = os.path.abspath(os.path.join(start, path))
 
 
 def _fill_tables(raw: dict[str, Any], source: Source, problem: type[Problem]) -> None:

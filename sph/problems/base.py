@@ -79,6 +79,9 @@ class Problem(Section):
       swamped    limits beyond which the problem's small signal is lost in numerical noise
       truth      what `exact` returns, as a phrase and as a label in figures: an exact solution, or
                  a reference solution from another method
+      paths      keys that name a file; a relative path in a configuration file begins at the
+                 directory of that file
+      filled_in  keys that `filled` adds; templates show them as comments
       profiled   whether figures show profiles over x or over the distance; otherwise, maps
       quantities meaning and unit of the columns of `diagnostics` and of the figures of `report`,
                  `compare` and `over_time`, by name; see `sph.quantity.meaning`
@@ -93,6 +96,8 @@ class Problem(Section):
     swamped: ClassVar[dict[str, Limit]] = {}
     quantities: ClassVar[Mapping[str, Quantity]] = {}
     truth: ClassVar[tuple[str, str]] = ("the exact solution", "exact")
+    paths: ClassVar[tuple[str, ...]] = ()
+    filled_in: ClassVar[tuple[str, ...]] = ()
     profiled: ClassVar[bool] = True
     profiles: ClassVar[tuple[str, ...]] = ("density", "velocity", "pressure", "internal_energy")
 
@@ -110,6 +115,15 @@ class Problem(Section):
         description='"periodic", "mirror" (reflecting wall) or "open" (vacuum outside) for all '
         "axes, or a list with one per axis"
     )
+
+    @classmethod
+    def filled(cls, keys: dict[str, Any]) -> tuple[dict[str, Any], list[Fault]]:
+        """Return the keys with those that the problem finds elsewhere, and faults of given keys.
+
+        keys: the table [problem] before validation. Raises FileError for a file that is missing or
+        wrong.
+        """
+        return keys, []
 
     @property
     def box(self) -> np.ndarray:
