@@ -61,7 +61,7 @@ class Program(click.Group):
 @click.group(cls=Program, context_settings={"help_option_names": ["-h", "--help"]})
 @click.version_option(__version__, prog_name="sph")
 def main():
-    """Smoothed-particle hydrodynamics (SPH) of compressible gas.
+    """Smoothed-particle hydrodynamics (SPH) of gases, liquids and solids.
 
     \b
     First steps:
