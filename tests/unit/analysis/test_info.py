@@ -245,14 +245,52 @@ def test_defaults_of_every_problem_differ_in_nothing():
         assert settings.different(config.from_text(f'[problem]\nname = "{name}"\n')) == [], name
 
 
-def test_defaults_that_cannot_be_found_make_all_keys_different(monkeypatch):
+def test_settings_are_those_that_differ_from_defaults_of_problem_and_formulation():
+    text = """
+    [problem]
+    name = "bodies"
+    [[problem.body]]
+    shape = "disc"
+    centre = [0.0, 0.0]
+    radius = 0.5
+    [physics]
+    formulation = "continuum"
+    eos = { name = "tait", rho_0 = 1.0, c_0 = 2.0 }
+    kernel = "cubic_spline"
+    [time]
+    end = 4.0
+    """
+    made = config.from_text(text)
+    found = {one["key"]: one for one in settings.different(made)}
+    # the others are defaults of "bodies"
+    assert {*found} - {"physics.strength"} == {"problem.body", "physics.eos"}
+    assert found["physics.eos"]["default"]["c_0"] == 1.0
+    assert len(found["problem.body"]["default"]) == 2
+    assert found["problem.body"]["value"][0]["radius"] == 0.5
+
+
+def test_default_that_is_not_given_is_shown():
+    made = config.from_text(
+        '[problem]\nname = "uniform"\n[physics]\neos = { name = "ideal_gas", gamma = 1.5 }\n'
+    )
+    found = {one["key"]: (one["value"], one["default"]) for one in settings.different(made)}
+    assert found["physics.gamma"] == (None, 1.4)
+    assert found["physics.eos"] == ({"name": "ideal_gas", "gamma": 1.5}, None)
+
+
+def test_defaults_of_a_problem_that_cannot_be_made_alone_are_found_by_key(monkeypatch):
+    """Such as a problem in a file of a user."""
     from sph.errors import ConfigError
 
-    made = config.from_text('[problem]\nname = "uniform"\n')
+    text = '[problem]\nname = "noh"\nn = 77\n[units]\nlength = "m"\nmass = "kg"\ntime = "s"\n'
+    made = config.from_text(text)
 
     def refuse(text):
         raise ConfigError("no")
 
     monkeypatch.setattr(config, "from_text", refuse)
-    keys = [one["key"] for one in settings.different(made)]
-    assert {"problem.n", "physics.C", "time.end", "run.threads"} <= {*keys}
+    found = {one["key"]: (one["value"], one["default"]) for one in settings.different(made)}
+    assert found == {
+        "problem.n": (77, type(made.problem).model_fields["n"].default),
+        "units.length": ("m", None), "units.mass": ("kg", None), "units.time": ("s", None),
+    }  # fmt: skip
