@@ -138,7 +138,9 @@ class Iterations(Messages):
     def step(self, count, residual):
         if time.monotonic() - self._last >= LINE_INTERVAL:
             self._last = time.monotonic()
-            self.note(f"{self.what}: iteration {count} of at most {self.most}, {residual:.2e}")
+            self.note(
+                f"{self.what}: iteration {count} of at most {self.most}, residual {residual:.2e}"
+            )
 
 
 class IterationBar(Iterations):
@@ -151,6 +153,9 @@ class IterationBar(Iterations):
 
         super().__init__(what, most)
         self._bar = tqdm.tqdm(total=most, bar_format=self.FORMAT, leave=False)
+
+    def note(self, text):
+        self._bar.write(text, file=sys.stderr)
 
     def step(self, count, residual):
         self._bar.set_description_str(f"{self.what}, residual {residual:.2e}", refresh=False)

@@ -27,7 +27,6 @@ class Problem(base.Problem):
     }
     limits: ClassVar = {
         "energy_drift": base.Limit(1e-3, "error of the leapfrog in any flow"),
-        "momentum_change": base.Limit(1e-12, "pair forces are equal and opposite: only round-off"),
     }
     profiled: ClassVar = False
     paths: ClassVar = ("path",)
