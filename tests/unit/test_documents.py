@@ -25,6 +25,7 @@ DOCUMENTS = [
     ROOT / "README.md",
     ROOT / "CONTRIBUTING.md",
     *sorted((ROOT / "docs").glob("*.md")),
+    *sorted((ROOT / "docs" / "problems").glob("*.md")),
     ROOT / "docs" / "benchmarks" / "README.md",
     ROOT / "docs" / "studies" / "README.md",
 ]

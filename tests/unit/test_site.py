@@ -4,6 +4,7 @@
 """
 
 import re
+import runpy
 from pathlib import Path
 
 import numpy as np
@@ -51,6 +52,21 @@ def test_every_entry_of_the_navigation_exists():
     sources = [ROOT / top[page] if page in top else DOCS / page for page in pages()]
     assert len(sources) > 20
     assert not [str(path) for path in sources if not path.exists()]
+
+
+def test_pages_of_problems_match_sources():
+    script = runpy.run_path(str(ROOT / "scripts" / "write_problems.py"))
+    written = {
+        one.name: one.read_text(encoding="utf-8") for one in (DOCS / "problems").glob("*.md")
+    }
+    assert written == script["pages"](), "run: python scripts/write_problems.py"
+
+
+def test_page_of_a_problem_has_its_theory_and_limits():
+    page = (DOCS / "problems" / "noh.md").read_text(encoding="utf-8")
+    assert "**(231)** State inside the shock" in page
+    assert "`planar_norm_density`" in page
+    assert "sph run configs/noh_2d.toml" in page
 
 
 @pytest.fixture
