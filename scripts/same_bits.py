@@ -43,6 +43,7 @@ SMALL = {
     "point_explosion_2d": ["problem.n=4096"],
     "polytrope": ["problem.n=1000"],
     "rayleigh_taylor": ["problem.n=2048"],
+    "regions": ["problem.n=1024"],
     "rubber_rings": ["problem.n=1100"],
     "sod_3d": ["problem.n=6000"],
     "sound_wave_2d": ["problem.n=1024"],

@@ -128,6 +128,43 @@ class RunBar(RunLines):
         self._bar.close()
 
 
+class Iterations(Messages):
+    """Of an iteration towards a residual: a line every LINE_INTERVAL."""
+
+    def __init__(self, what: str, most: int):
+        """what: what is done, as a participle; most: the largest number of iterations."""
+        self.what, self.most, self._last = what, most, time.monotonic()
+
+    def step(self, count, residual):
+        if time.monotonic() - self._last >= LINE_INTERVAL:
+            self._last = time.monotonic()
+            self.note(
+                f"{self.what}: iteration {count} of at most {self.most}, residual {residual:.2e}"
+            )
+
+
+class IterationBar(Iterations):
+    """Of an iteration towards a residual: a bar over the iterations."""
+
+    FORMAT = "{percentage:3.0f}%|{bar}| {desc} [{elapsed}, at most {remaining} left]"
+
+    def __init__(self, what: str, most: int):
+        import tqdm
+
+        super().__init__(what, most)
+        self._bar = tqdm.tqdm(total=most, bar_format=self.FORMAT, leave=False)
+
+    def note(self, text):
+        self._bar.write(text, file=sys.stderr)
+
+    def step(self, count, residual):
+        self._bar.set_description_str(f"{self.what}, residual {residual:.2e}", refresh=False)
+        self._bar.update(count - self._bar.n)
+
+    def close(self):
+        self._bar.close()
+
+
 def suited() -> Lines:
     """Progress of one run: a bar on a terminal, lines elsewhere."""
     return Bar() if _is_watched() else Lines()
@@ -138,6 +175,11 @@ def suited_to_runs(what: str, total: int | None, done: int = 0) -> RunLines:
     if total is None or not _is_watched():
         return RunLines(what, total, done)
     return RunBar(what, total, done)
+
+
+def suited_to_iterations(what: str, most: int) -> Iterations:
+    """Progress of an iteration, see `Iterations`: a bar on a terminal, lines elsewhere."""
+    return IterationBar(what, most) if _is_watched() else Iterations(what, most)
 
 
 def _is_watched():

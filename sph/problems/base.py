@@ -77,6 +77,9 @@ class Problem(Section):
       swamped    limits beyond which the problem's small signal is lost in numerical noise
       truth      what `exact` returns, as a phrase and as a label in figures: an exact solution, or
                  a reference solution from another method
+      paths      keys that name a file; a relative path in a configuration file begins at the
+                 directory of that file
+      filled_in  keys that `filled` adds; templates show them as comments
       profiled   whether figures show profiles over x or over the distance; otherwise, maps
       profiles   the four fields of these profiles; solids have "stress", which is -sigma_xx
     """
@@ -88,6 +91,8 @@ class Problem(Section):
     radial: ClassVar[bool] = False
     swamped: ClassVar[dict[str, Limit]] = {}
     truth: ClassVar[tuple[str, str]] = ("the exact solution", "exact")
+    paths: ClassVar[tuple[str, ...]] = ()
+    filled_in: ClassVar[tuple[str, ...]] = ()
     profiled: ClassVar[bool] = True
     profiles: ClassVar[tuple[str, ...]] = ("density", "velocity", "pressure", "internal_energy")
 
@@ -105,6 +110,15 @@ class Problem(Section):
         description='"periodic", "mirror" (reflecting wall) or "open" (vacuum outside) for all '
         "axes, or a list with one per axis"
     )
+
+    @classmethod
+    def filled(cls, keys: dict[str, Any]) -> tuple[dict[str, Any], list[Fault]]:
+        """Return the keys with those that the problem finds elsewhere, and faults of given keys.
+
+        keys: the table [problem] before validation. Raises FileError for a file that is missing or
+        wrong.
+        """
+        return keys, []
 
     @property
     def box(self) -> np.ndarray:

@@ -9,7 +9,7 @@ from typing import Annotated, ClassVar, Literal
 import numpy as np
 from pydantic import Field
 
-from sph.problems import base
+from sph.problems import _relax, base
 from sph.problems.base import wide
 from sph.problems.support import lattice as placement
 from sph.problems.support.vortex import from_centre, rotation
@@ -21,7 +21,7 @@ PEAK_RADIUS, RADIUS = 0.2, 0.4  # of the maximum of the speed (1), and of the vo
 CENTRAL_PRESSURE = 5.0
 
 
-class Problem(base.Problem):
+class Problem(_relax.Relaxable):
     """A steady vortex with kinks in its velocity, at rest or in uniform motion."""
 
     defaults: ClassVar = {
@@ -65,7 +65,7 @@ class Problem(base.Problem):
     )
 
     def initial(self, eos) -> base.InitialState:
-        position = placement.fill(self.box, self.n, self.lattice)
+        position = self.on_glass(placement.fill(self.box, self.n, self.lattice))
         n = position.shape[1]
         state = self.exact(eos, 0.0, position)
         mass = np.full(n, DENSITY * np.prod(self.box[:, 1] - self.box[:, 0]) / n)

@@ -11,7 +11,7 @@ import numpy as np
 from pydantic import Field
 
 from sph.exact import kelvin_helmholtz as linear
-from sph.problems import base
+from sph.problems import _relax, base
 from sph.problems.base import only
 from sph.problems.support.lattice import fill
 from sph.problems.support.shear_mode import mode_amplitude, surface_weight
@@ -30,7 +30,7 @@ GROWTH = (0.5, 1.0)
 POINTS = 128  # of linear theory along y; its growth rate is then accurate to 0.1 %
 
 
-class Problem(base.Problem):
+class Problem(_relax.Relaxable):
     """Two streams of densities 1 and 2 with a smooth transition: growth rate against theory."""
 
     defaults: ClassVar = {
@@ -60,8 +60,8 @@ class Problem(base.Problem):
     boundary: Literal["periodic"] = Field(default="periodic", description="boundary of both axes")
 
     def initial(self, eos) -> base.InitialState:
-        """Return a cubic lattice whose masses follow the density."""
-        position = fill(self.box, self.n, "cubic")
+        """Return a cubic lattice, or a glass, whose masses follow the density."""
+        position = self.on_glass(fill(self.box, self.n, "cubic"))
         x, y = position
         density = _ramped(*DENSITY, y)
         velocity = np.stack([_ramped(*SPEED, y), PERTURBATION * np.sin(2 * np.pi * x / WAVELENGTH)])

@@ -7,14 +7,14 @@ import numpy as np
 from pydantic import Field, field_validator
 
 from sph.exact import riemann
-from sph.problems import base
+from sph.problems import _relax, base
 from sph.problems.support import boundary_waves
 from sph.problems.support import lattice as placement
 
 _SHARED = base.Problem.model_fields
 
 
-class Problem(base.Problem):
+class Problem(_relax.Relaxable):
     """Uniform gas at rest or in uniform motion: a steady-state test."""
 
     defaults: ClassVar = {
@@ -70,7 +70,7 @@ class Problem(base.Problem):
 
     def allowed(self) -> dict[str, base.Limit]:
         """Return the limits: without a lattice, particles move until they have settled."""
-        if self.noise == 0.0 and self.lattice not in ("relaxed", "random"):
+        if self.noise == 0.0 and self.lattice not in ("relaxed", "random") and self.relax is None:
             return self.limits
         return {"energy_drift": base.Limit(1e-3, "error of the time integration in any flow")}
 
@@ -78,6 +78,7 @@ class Problem(base.Problem):
         position = placement.fill(self.box, self.n, self.lattice, self.seed)
         if self.noise:
             position = placement.with_noise(position, self.box, self.noise, self.seed)
+        position = self.on_glass(position)
         n = position.shape[1]
         volume = np.prod(self.box[:, 1] - self.box[:, 0])
         state = self.exact(eos, 0.0, position)

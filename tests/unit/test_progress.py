@@ -129,6 +129,29 @@ def test_sweep_bar_counts_points_and_keeps_lines_whole(monkeypatch):
     assert re.search(r"(^|[\r\n] *)\[2/4\] b done\n", shown)
 
 
+def test_bar_of_iterations_shows_residual_and_keeps_notes_whole(monkeypatch):
+    stream = io.StringIO()
+    monkeypatch.setattr(sys, "stderr", stream)
+    bar = progress.IterationBar("relaxing", 200)
+    bar.step(50, 3e-3)
+    bar._bar.refresh()
+    bar.note("relaxed")
+    bar.close()
+    assert re.search(
+        r" 25%\|.*\| relaxing, residual 3\.00e-03 \[00:0\d, at most .* left\]", stream.getvalue()
+    )
+    assert re.search(r"(^|[\r\n] *)relaxed\n", stream.getvalue())
+
+
+def test_lines_of_iterations_are_seconds_apart(clock, capsys):
+    lines = progress.Iterations("relaxing", 200)
+    for count in range(1, 8):
+        clock.now += 3.0
+        lines.step(count, 1e-3)
+    lines.close()
+    assert capsys.readouterr().err == "relaxing: iteration 4 of at most 200, residual 1.00e-03\n"
+
+
 def on_terminal(monkeypatch, columns):
     monkeypatch.setattr(sys, "stderr", SimpleNamespace(isatty=lambda: True, fileno=lambda: 2))
     monkeypatch.setattr(os, "get_terminal_size", lambda descriptor: os.terminal_size((columns, 24)))
@@ -138,7 +161,10 @@ def test_progress_is_bar_on_terminal_and_lines_elsewhere(monkeypatch):
     assert type(progress.suited()) is progress.Lines  # the tests' own stderr is no terminal
     on_terminal(monkeypatch, 80)
     assert type(progress.suited()) is progress.Bar
+    monkeypatch.setattr(progress.IterationBar, "__init__", lambda *_: None)  # stderr takes no text
+    assert type(progress.suited_to_iterations("relaxing", 9)) is progress.IterationBar
     on_terminal(monkeypatch, 0)
+    assert type(progress.suited_to_iterations("relaxing", 9)) is progress.Iterations
     assert type(progress.suited()) is progress.Lines
     assert type(progress.suited_to_runs("points", 2)) is progress.RunLines
     on_terminal(monkeypatch, 80)

@@ -21,7 +21,7 @@ from sph.scene import Scene
 from sph.state import State as Particles
 from sph.totals import Baseline, Budget
 
-SMALL = {"shock_tube": 60, "point_explosion": 512, "particles": 4}
+SMALL = {"shock_tube": 60, "point_explosion": 512, "particles": 4, "file": 1024}
 SETS = {
     1: {"profiles", "evolution", "history"},
     2: {"map", "evolution", "history"},

@@ -63,10 +63,10 @@ ENDS = {
     "keplerian_ring": ("keplerian_ring", (), 0.15 / math.sqrt(5e-6 / 3), "ring's edges"),
 }  # fmt: skip
 FOR_EVER = {
-    "blast_waves", "blob", "bodies", "contrast", "elastic_bar", "expanding_ball", "gresho",
+    "blast_waves", "blob", "bodies", "contrast", "elastic_bar", "expanding_ball", "file", "gresho",
     "hydrostatic_tank", "kelvin_helmholtz", "kelvin_helmholtz_smooth", "oscillating_plate",
-    "particles", "polytrope", "rayleigh_taylor", "rotating_disc", "rubber_rings", "square",
-    "taylor_bar", "uniform", "yee",
+    "particles", "polytrope", "rayleigh_taylor", "regions", "rotating_disc", "rubber_rings",
+    "square", "taylor_bar", "uniform", "yee",
 }  # fmt: skip
 
 
@@ -121,7 +121,7 @@ def test_exact_solution_steady_never_ends(problem):
     ids=lambda other: next(iter(other)),
 )
 def test_exact_solution_with_field_or_heating_is_missing(problem, other):
-    small = () if problem == "particles" else ("problem.n=100",)
+    small = () if problem in ("particles", "file") else ("problem.n=100",)
     plain = made(problem, *small)
     # set on the table itself: a configuration refuses a point mass in a periodic box
     physics = type(plain.physics)(**plain.physics.model_dump(exclude_none=True) | other)

@@ -1,0 +1,149 @@
+"""An initial state of gas from a file: HDF5 of GADGET or SWIFT, .npz, or a checkpoint."""
+
+import os
+from typing import Annotated, Any, ClassVar, Literal
+
+from pydantic import Field, model_validator
+
+from sph.errors import ConfigError
+from sph.problems import base, files
+from sph.problems.base import Fault
+from sph.problems.files import contents
+
+_SHARED = base.Problem.model_fields
+
+# What a file states. If these keys are given, as in the configuration of a run, no file is needed.
+FILLED_IN = ("sha256", "dimension", "n", "domain", "boundary")
+
+
+class Problem(base.Problem):
+    """Gas whose initial state is in a file. No exact solution is known."""
+
+    defaults: ClassVar = {
+        "physics.gamma": 5.0 / 3.0,
+        "physics.alpha": 1.0,
+        "time.end": 1.0,
+        "output.interval": 0.1,
+    }
+    limits: ClassVar = {
+        "energy_drift": base.Limit(1e-3, "error of the leapfrog in any flow"),
+    }
+    profiled: ClassVar = False
+    paths: ClassVar = ("path",)
+    filled_in: ClassVar = ("path", *FILLED_IN)
+
+    name: Literal["file"] = "file"
+    path: str = Field(
+        default="",
+        description="HDF5 file in the layout of GADGET or SWIFT, an .npz file, or a checkpoint of "
+        "a run; a relative path begins at the directory of the configuration file, one of --set at "
+        "the current directory; a sample of two clouds that collide if not given",
+        examples=["ic.hdf5"],
+    )
+    sha256: str = Field(
+        default="",
+        pattern="^([0-9a-f]{64})?$",
+        description="SHA-256 of the file in hexadecimal digits; checked if given, that of the file "
+        "otherwise, so that a run and its checkpoints tell from which file the run began",
+        examples=["0" * 64],
+    )
+    dimension: Annotated[int, _SHARED["dimension"]] = Field(
+        default=2,
+        description="number of space dimensions; if not given, Dimension of /HydroScheme or "
+        "/Header, or the number of columns of the coordinates",
+        examples=[3],
+    )
+    n: int = Field(
+        default=1,
+        ge=1,
+        le=100_000_000,
+        description="number of particles; that of the file if not given",
+        examples=[10000],
+    )
+    domain: Annotated[list[float] | list[list[float]], _SHARED["domain"]] = Field(
+        default=[0.0, 1.0],
+        description="ends of the box: [lo, hi] for all axes, or a list with one [lo, hi] per axis; "
+        "the box of the file if not given, or the extent of the particles if the file has none",
+        examples=[[0.0, 1.0]],
+    )
+    boundary: Annotated[base.Boundary | list[base.Boundary], _SHARED["boundary"]] = Field(
+        default="periodic",
+        description='"periodic", "mirror" (reflecting wall) or "open" (vacuum outside) for all '
+        "axes, or a list with one per axis; if not given, that of a checkpoint, periodic if the "
+        "file has a box, otherwise open",
+        examples=["periodic"],
+    )
+
+    @model_validator(mode="before")
+    @classmethod
+    def _fill_in(cls, keys: Any) -> Any:
+        if not isinstance(keys, dict):
+            return keys
+        keys, faults = cls.filled(keys)
+        if faults:
+            raise base.refused(faults)
+        return keys
+
+    @classmethod
+    def filled(cls, keys: dict[str, Any]) -> tuple[dict[str, Any], list[Fault]]:
+        """Return the keys with those that the file states, and faults of keys that contradict it.
+
+        Raises FileError if the file cannot be used. Does not read the file if all keys are given.
+        """
+        path, dimension = keys.get("path") or str(files.SAMPLE), keys.get("dimension")
+        if not isinstance(path, str) or dimension not in (None, 1, 2, 3):
+            return keys, []  # reported by the check of types
+        if "\0" in path or not path.isprintable():
+            return keys, [Fault(("path",), f"= {path!a}: expected printable UTF-8 text")]
+        if all(keys.get(name) for name in FILLED_IN):
+            return keys, []
+        path = os.path.abspath(path)
+        found = files.read(path, dimension)
+        dimension = len(found.position)
+        box = contents.extent(found.position) if found.box is None else found.box
+        stated = {
+            "sha256": found.sha256,
+            "dimension": dimension,
+            "n": found.mass.size,
+            "domain": box.tolist(),
+            "boundary": found.boundary,
+        }
+        given = {name: value for name, value in keys.items() if value not in ("", None)}
+        return stated | given | {"path": path}, _contradictions(given, stated)
+
+    @model_validator(mode="after")
+    def _has_particles_inside(self):
+        kept = files.kept(self.path, self.sha256, self.dimension)
+        if kept is not None and self.box.shape == (len(self.boundaries), 2):
+            contents.check_inside(kept, self.box, self.boundaries)
+        return self
+
+    def fills_box(self, eos) -> bool:
+        """Return False: positions are arbitrary."""
+        return False
+
+    def initial(self, eos) -> base.InitialState:
+        """Return the particles of the file, in the order of their IDs if the file has some."""
+        found = files.take(self.path, self.sha256, self.dimension)
+        stated = {"sha256": found.sha256, "n": found.mass.size}
+        if faults := _contradictions(self.model_dump(), stated):
+            raise ConfigError("\n".join(f"problem.{one.path[0]} {one.text}" for one in faults))
+        contents.check_inside(found, self.box, self.boundaries)
+        return base.InitialState(
+            found.position, found.velocity, found.mass, found.internal_energy, found.others
+        )
+
+
+def _contradictions(given: dict[str, Any], stated: dict[str, Any]) -> list[Fault]:
+    """Return faults of the SHA-256 and the number of particles that differ from the file's."""
+    found = []
+    if given.get("sha256", stated["sha256"]) != stated["sha256"]:
+        text = (
+            f'= "{given["sha256"]}": the file has changed, or is another one: its SHA-256 is '
+            f"{stated['sha256']}. Try: the original file, or leave sha256 out"
+        )
+        found.append(Fault(("sha256",), text))
+    if given.get("n", stated["n"]) != stated["n"]:
+        text = f"= {given['n']}: expected {stated['n']}, the number of particles in the file"
+        found.append(Fault(("n",), f"{text}. Try: leave n out"))
+    return found
