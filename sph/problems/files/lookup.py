@@ -1,4 +1,4 @@
-"""Lookups in HDF5 files with the layout of GADGET or SWIFT, which refuse what does not fit.
+"""Lookups in HDF5 files with the layout of GADGET or SWIFT; refuses what does not fit."""
 
 import h5py
 import numpy as np
