@@ -21,6 +21,9 @@ errors. The messages give file, line and the nearest valid name, and `sph` repor
 together. A key that is not given has its default. A problem may have its own defaults for keys of
 other tables. `--set TABLE.KEY=VALUE` sets a key from the command line.
 
+In place of `problem.name`, `problem.file` names a Python file with a problem of your own
+([own_problem.md](own_problem.md)); `sph new FILE.py` prints its keys.
+
 The class of a key says whether `sph restart --set` may change the key:
 
 {classes}

@@ -91,9 +91,9 @@ def conservation(history, particles, scene, start: Baseline) -> Conservation:
     }
 
 
-def _relative(energy: float, scale: float) -> float:
-    """Return energy/scale, 0 for no energy: matter may begin at rest, without energy."""
-    return float(energy / scale) if energy != 0.0 else 0.0
+def _relative(amount: float, scale: float) -> float:
+    """Return amount/scale, 0 for no amount: matter may be at rest, without energy."""
+    return float(np.divide(amount, scale)) if amount != 0.0 else 0.0
 
 
 def baseline(history) -> Baseline:
@@ -115,7 +115,7 @@ def _momentum_change(history, particles, scene) -> float | None:
         sound_speed = scene.formulation.sound_speed(p)
         speed = np.linalg.norm(p.velocity - bulk[:, None], axis=0)
         scale = float(np.sum(p.mass * (speed + sound_speed)))
-    return float(np.abs(momentum - momentum[:, :1]).max() / scale)
+    return _relative(float(np.abs(momentum - momentum[:, :1]).max()), scale)
 
 
 def _farthest_from_one(ratio: np.ndarray) -> float:

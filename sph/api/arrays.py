@@ -38,10 +38,10 @@ class _Arrays(base.Problem):
     def clamps(self) -> bool:
         return bool(np.any(self._start.others.get("clamped", 0.0)))
 
-    def fills_box(self, eos) -> bool:
+    def fills_box(self, eos: Any) -> bool:
         return False  # positions are arbitrary
 
-    def initial(self, eos) -> base.InitialState:
+    def initial(self, eos: Any) -> base.InitialState:
         return self._start
 
 

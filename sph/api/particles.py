@@ -50,7 +50,7 @@ class Particles:
         if name not in self.fields:
             raise KeyError(f"no field {name!r}; expected one of {', '.join(self.fields)}")
         state = self._of_state()
-        # internal energy has a stored pressure in some schemes: the formulation knows which counts
+        # some schemes store a pressure too: the formulation knows which one counts
         values = self._of_pressure() if name == "pressure" else getattr(state, name)
         return values[..., np.argsort(state.id, kind="stable")]
 

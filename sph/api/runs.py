@@ -18,6 +18,7 @@ from sph.config import Config
 from sph.errors import Stopped
 from sph.output.run_directory import RunDirectory
 from sph.scene import Scene
+from sph.simulation import Simulation as Engine
 
 CALLBACK = "the callback"  # which stopped the run, in messages and in the summary
 
@@ -80,7 +81,7 @@ def run(
 class _Scratch:
     """A temporary directory, which is removed when nothing refers to this object."""
 
-    def __init__(self):
+    def __init__(self) -> None:
         self.path = Path(tempfile.mkdtemp(prefix="sph-"))
         weakref.finalize(self, shutil.rmtree, self.path, ignore_errors=True)
 
@@ -97,14 +98,14 @@ def _resolved(config: Any, overrides: Sequence[str] | Mapping[str, Any]) -> Conf
 class _Log(progress.Messages):
     """Progress that writes notes to the logger."""
 
-    def note(self, text):
+    def note(self, text: str) -> None:
         log.info(text)
 
-    def start(self, begin, end): ...
+    def start(self, begin: float, end: float) -> None: ...
 
-    def step(self, simulation): ...
+    def step(self, simulation: Engine) -> None: ...
 
-    def wrote(self, path, simulation): ...
+    def wrote(self, path: Path, simulation: Engine) -> None: ...
 
 
 class _Watched(progress.Messages):
@@ -116,24 +117,24 @@ class _Watched(progress.Messages):
         self.shown, self.callback = shown, callback
         self.each_step = callback is not None and each == "step"
 
-    def note(self, text):
+    def note(self, text: str) -> None:
         self.shown.note(text)
 
-    def start(self, begin, end):
+    def start(self, begin: float, end: float) -> None:
         self.shown.start(begin, end)
 
-    def close(self):
+    def close(self) -> None:
         self.shown.close()
 
-    def step(self, simulation):
+    def step(self, simulation: Engine) -> str | None:
         self.shown.step(simulation)
         return self._reason(simulation) if self.each_step else None
 
-    def wrote(self, path, simulation):
+    def wrote(self, path: Path, simulation: Engine) -> str | None:
         self.shown.wrote(path, simulation)
         return None if self.each_step else self._reason(simulation)
 
-    def _reason(self, simulation) -> str | None:
+    def _reason(self, simulation: Engine) -> str | None:
         """Call back. Return why the run is to stop, or None."""
         if self.callback is None:
             return None

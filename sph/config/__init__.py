@@ -31,7 +31,7 @@ class Config:
     output: Output
     report: Report
     run: Run
-    units: Units = dataclasses.field(default_factory=Units)
+    units: Units = dataclasses.field(default_factory=lambda: Units.model_validate({}))
 
     def to_toml(self) -> str:
         """Return all keys in declared order as TOML that reads back to an equal configuration."""

@@ -146,13 +146,15 @@ def _extended(found: type[base.Problem], origin: str, **keys: Any) -> type[Outsi
     """Return a subclass with more keys, whose methods report errors (`reported`)."""
     _check_defaults(found, origin)
     made: Any = create_model("Problem", __base__=(found, Outside), __doc__=found.__doc__, **keys)
-    made.origin = origin
+    made.origin, made.filled_in = origin, (*found.filled_in, *SOURCES)
     for name, ours in vars(base.Problem).items():
         own = getattr_static(found, name)
         if name.startswith("_") or own is ours:
             continue
         if isinstance(own, FunctionType):
             setattr(made, name, _reporting(own, origin))
+        elif isinstance(own, classmethod):
+            setattr(made, name, classmethod(_reporting(own.__func__, origin)))
         elif isinstance(own, property) and own.fget:
             setattr(made, name, property(_reporting(own.fget, origin)))
     return made

@@ -33,9 +33,6 @@ _IN_PLACE_OF = {
 # equation of state of a liquid must not get a solid.
 _WITHOUT_DEFAULT = {**_IN_PLACE_OF, "physics.strength": ("eos", "gamma", "materials")}
 
-# Keys of [problem] whose relative paths begin at the directory of the configuration file.
-PATHS = ("file", "path")
-
 
 class Source(NamedTuple):
     """Tables before validation, and the origin of each key: a line number or an override."""
@@ -93,24 +90,6 @@ def parse(text: str, name: str, directory: str = "") -> Source:
         return Source(name, tomllib.loads(text), dict(key_lines(text)), directory)
     except (ValueError, RecursionError) as error:
         raise ConfigError(_syntax_message(str(error), text, name)) from None
-
-
-def read_to_copy(path: str | FilePath) -> str:
-    """Return the text of a configuration file, with absolute paths, for a copy elsewhere.
-
-    Raises FileError and ConfigError.
-    """
-    text, directory = read(path), FilePath(path).parent
-    source, lines = parse(text, str(path)), text.splitlines(keepends=True)
-    given = source.tables.get("problem")
-    for key, value in given.items() if isinstance(given, dict) else ():
-        line = source.places.get(("problem", key))
-        if key in PATHS and isinstance(value, str) and value and isinstance(line, int):
-            absolute = f"{key} = {value_text(os.path.abspath(directory / value))}"
-            found = re.search(rf"""\b{key}\s*=\s*("[^"]*"|'[^']*')""", lines[line - 1])
-            if found:
-                lines[line - 1] = lines[line - 1].replace(found[0], absolute, 1)
-    return "".join(lines)
 
 
 def _syntax_message(message: str, text: str, name: str) -> str:

@@ -93,11 +93,11 @@ class Problem(base.Problem):
         path, dimension = keys.get("path") or str(files.SAMPLE), keys.get("dimension")
         if not isinstance(path, str) or dimension not in (None, 1, 2, 3):
             return keys, []  # reported by the check of types
-        if "\0" in path or not path.isprintable():
+        path = os.path.abspath(path)
+        if not path.isprintable():
             return keys, [Fault(("path",), f"= {path!a}: expected printable UTF-8 text")]
         if all(keys.get(name) for name in FILLED_IN):
             return keys, []
-        path = os.path.abspath(path)
         found = files.read(path, dimension)
         dimension = len(found.position)
         box = contents.extent(found.position) if found.box is None else found.box

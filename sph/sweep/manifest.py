@@ -13,7 +13,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from sph import config as configuration
-from sph.config import Config, reading
+from sph.config import Config
+from sph.config.copies import read_to_copy
 from sph.config.toml_text import key_text, value_text
 from sph.errors import ConfigError, FileError, first_line
 from sph.output.files import (
@@ -80,12 +81,12 @@ class SweepDirectory:
             if self.is_one:
                 plan = self._extended(plan, resolved)
             elif self.path.exists():
-                self._refuse_other_things(reading.read_to_copy(config))
+                self._refuse_other_things(read_to_copy(config))
             self._refuse_other_runs(resolved)
             refuse_link(self.logs)
             self.logs.mkdir(parents=True, exist_ok=True)
         if not self.is_one:
-            write_text(self.base, reading.read_to_copy(config))
+            write_text(self.base, read_to_copy(config))
         write_text(self.manifest, _text(plan))
 
     def failures(self) -> dict[str, str]:

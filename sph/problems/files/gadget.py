@@ -15,23 +15,13 @@ from sph.problems.files.contents import (
     Contents,
     along_axes,
     as_rows,
-    as_scalars,
     check,
     refusal,
     rounding,
 )
+from sph.problems.files.lookup import DAMAGE, GAS, NAMES, Lookup
 
-GAS = "PartType0"
-NAMES = {
-    "position": ("Coordinates", "Positions", "Position"),
-    "velocity": ("Velocities", "Velocity"),
-    "mass": ("Masses", "Mass"),
-    "internal_energy": ("InternalEnergies", "InternalEnergy"),
-    "density": ("Densities", "Density"),
-    "id": ("ParticleIDs", "ParticleID"),
-}
 TYPES = ("gas", "dark matter", "disk", "bulge", "stars", "black holes or boundary", "neutrinos")
-DAMAGE = (OSError, RuntimeError, KeyError, ValueError, TypeError, AttributeError, MemoryError)
 
 
 def read(file: io.IOBase, path: str, dimension: int | None, digest: str) -> Contents:
@@ -54,33 +44,33 @@ def read(file: io.IOBase, path: str, dimension: int | None, digest: str) -> Cont
         raise refusal(path, f"it cannot be read ({error})", "an intact HDF5 file") from error
 
 
-class _File:
-    """An open file: lookups that refuse what is missing or of another kind."""
-
-    def __init__(self, file: h5py.File, path: str):
-        self.file, self.path = file, path
+class _File(Lookup):
+    """An open file with an initial state."""
 
     def contents(self, dimension: int | None, digest: str) -> Contents:
         self._check_header()
-        stored = self._array("position")
-        rows = as_rows(self.path, self._name("position"), stored, None, 3)
+        stored = self.array("position")
+        rows = as_rows(self.path, self.name("position"), stored, None, 3)
         n = len(rows)
         self._check_number(n)
         dim = dimension or self._dimension(rows)
         names = {"mass": "Header/MassTable"}
-        names |= {key: self._name(key) for key in NAMES if self._has(key)}
-        velocity = as_rows(self.path, self._name("velocity"), self._array("velocity"), n, 3)
+        names |= {key: self.name(key) for key in NAMES if self.has(key)}
+        position = along_axes(self.path, names["position"], rows, dim)
+        precision = rounding(stored)
+        del rows, stored  # before the next array is read
+        velocity = as_rows(self.path, self.name("velocity"), self.array("velocity"), n, 3)
         found = Contents(
             self.path,
             digest,
-            along_axes(self.path, names["position"], rows, dim),
+            position,
             along_axes(self.path, names["velocity"], velocity, dim),
             self._masses(n),
-            self._scalars("internal_energy", n),
+            self.scalars("internal_energy", n),
             names=names,
-            rounding=rounding(stored),
+            rounding=precision,
         )
-        if self._has("density") and (density := self._scalars("density", n)).any():
+        if self.has("density") and (density := self.scalars("density", n)).any():
             found.others = {"density": density}  # all zero: not known
         check(found)
         self._place(found, dim)
@@ -92,14 +82,14 @@ class _File:
     def _check_header(self) -> None:
         """Raise FileError for what the file is not: of one part, of gas only, without entropies."""
         for group in ("Header", GAS):
-            if not isinstance(self._get(self.file, group), h5py.Group):
+            if not isinstance(self.get(self.file, group), h5py.Group):
                 groups = ", ".join(f"/{one}" for one in self.file) or "nothing"
                 raise refusal(
                     self.path,
                     f"it has no group /{group}, but {groups}",
                     "the layout of GADGET or SWIFT, with /Header and /PartType0",
                 )
-        if (files := self._header("NumFilesPerSnapshot", 1)[0]) > 1:
+        if (files := self.header("NumFilesPerSnapshot", 1)[0]) > 1:
             raise refusal(
                 self.path,
                 f"Header/NumFilesPerSnapshot is {files:g}: it is one part of several",
@@ -108,13 +98,13 @@ class _File:
             )
         self._check_types()
         for name in ("Flag_Entropy_ICs", "flag_entropy_instead_u"):
-            if np.any(self._header(name, 0)):
+            if np.any(self.header(name, 0)):
                 raise refusal(
                     self.path,
                     f"Header/{name} is set: the file states entropies",
                     "internal energies per unit mass",
                 )
-        cosmology = self._get(self.file, "Cosmology")
+        cosmology = self.get(self.file, "Cosmology")
         if cosmology is not None and np.any(cosmology.attrs.get("Cosmological run", 0)):
             raise refusal(
                 self.path,
@@ -123,9 +113,9 @@ class _File:
             )
 
     def _check_types(self) -> None:
-        totals = self._header("NumPart_Total", self._header("NumPart_ThisFile", 0))
+        totals = self.header("NumPart_Total", self.header("NumPart_ThisFile", 0))
         for kind in range(1, len(TYPES)):
-            group = self._get(self.file, f"PartType{kind}")
+            group = self.get(self.file, f"PartType{kind}")
             stored = isinstance(group, h5py.Group) and any(
                 getattr(one, "size", 0) for one in group.values()
             )
@@ -139,21 +129,21 @@ class _File:
 
     def _check_number(self, n: int) -> None:
         if n == 0:
-            raise refusal(self.path, f"{self._name('position')} holds no particle", "at least one")
-        stated = self._header("NumPart_ThisFile", n)[0]
+            raise refusal(self.path, f"{self.name('position')} holds no particle", "at least one")
+        stated = self.header("NumPart_ThisFile", n)[0]
         if stated != n:
             raise refusal(
                 self.path,
                 f"Header/NumPart_ThisFile states {stated:g} gas particles and "
-                f"{self._name('position')} holds {n}",
+                f"{self.name('position')} holds {n}",
                 "equal numbers",
             )
 
     def _dimension(self, rows: np.ndarray) -> int:
         for group in ("HydroScheme", "Header"):
-            there = self._get(self.file, group)
+            there = self.get(self.file, group)
             if there is not None and "Dimension" in there.attrs:
-                found = self._numbers(there, "Dimension")[0]
+                found = self.numbers(there, "Dimension")[0]
                 if found not in (1, 2, 3):
                     raise refusal(self.path, f"{group}/Dimension is {found:g}", "1, 2 or 3")
                 break
@@ -164,7 +154,7 @@ class _File:
         if flat and flat[0] > 0:
             raise refusal(
                 self.path,
-                f"all particles have one value of {self._name('position')} along "
+                f"all particles have one value of {self.name('position')} along "
                 f"{'xyz'[flat[0]]}, and the file says {found:g}-D",
                 "particles that fill all dimensions",
                 f"problem.dimension = {flat[0]}",
@@ -172,9 +162,9 @@ class _File:
         return int(found)
 
     def _masses(self, n: int) -> np.ndarray:
-        if self._has("mass"):
-            return self._scalars("mass", n)
-        each = self._header("MassTable", 0)[0]
+        if self.has("mass"):
+            return self.scalars("mass", n)
+        each = self.header("MassTable", 0)[0]
         if not each > 0.0:
             raise refusal(
                 self.path,
@@ -185,8 +175,8 @@ class _File:
 
     def _place(self, found: Contents, dim: int) -> None:
         """Move the particles to the origin of the file, and add the box and its boundary."""
-        origin = np.resize(self._header("Origin", 0), 3)[:dim]
-        size = self._header("BoxSize", 0)
+        origin = np.resize(self.header("Origin", 0), 3)[:dim]
+        size = self.header("BoxSize", 0)
         if (size.size not in (1, 2, 3) or 1 < size.size < dim) or not (
             np.isfinite(size).all() and (size >= 0.0).all()
         ):
@@ -210,7 +200,7 @@ class _File:
 
         The public groups of a checkpoint widen the box to hold all particles.
         """
-        group = self._get(self.file, "Checkpoint")
+        group = self.get(self.file, "Checkpoint")
         if group is None or "configuration" not in group.attrs:
             return None
         try:
@@ -232,9 +222,9 @@ class _File:
 
     def _sort(self, found: Contents) -> None:
         """Order the particles by ID, so that the particle with the k-th lowest ID is number k."""
-        if not self._has("id"):
+        if not self.has("id"):
             return
-        name, ids = self._name("id"), self._array("id")
+        name, ids = self.name("id"), self.array("id")
         if ids.dtype.kind not in "iu" or ids.shape != found.mass.shape:
             raise refusal(
                 self.path,
@@ -255,55 +245,3 @@ class _File:
             for key in ("position", "velocity", "mass", "internal_energy"):
                 setattr(found, key, np.ascontiguousarray(getattr(found, key)[..., order]))
             found.others = {key: array[order] for key, array in found.others.items()}
-
-    # --- lookups
-
-    def _get(self, group, name: str):
-        try:
-            return group.get(name)
-        except DAMAGE:  # a link to another file that is not there
-            return None
-
-    def _header(self, name: str, default) -> np.ndarray:
-        header = self.file["Header"]
-        if name not in header.attrs:
-            return np.ravel(np.asarray(default, dtype=float))
-        return self._numbers(header, name)
-
-    def _numbers(self, group, name: str) -> np.ndarray:
-        try:
-            found = np.ravel(np.asarray(group.attrs[name], dtype=float))
-        except DAMAGE:
-            found = np.empty(0)
-        if found.size == 0:
-            raise refusal(self.path, f"{group.name[1:]}/{name} holds no number", "numbers")
-        return found
-
-    def _has(self, key: str) -> bool:
-        return any(isinstance(self._get(self.file[GAS], one), h5py.Dataset) for one in NAMES[key])
-
-    def _name(self, key: str) -> str:
-        """Return the name of a dataset in the file; the usual one if it is missing."""
-        there = (
-            one for one in NAMES[key] if isinstance(self._get(self.file[GAS], one), h5py.Dataset)
-        )
-        return f"{GAS}/{next(there, NAMES[key][0])}"
-
-    def _array(self, key: str) -> np.ndarray:
-        name = self._name(key)
-        if not self._has(key):
-            listed = ", ".join(self.file[GAS]) or "nothing"
-            raise refusal(
-                self.path,
-                f"{GAS} has no dataset {name.removeprefix(GAS + '/')}, but {listed}",
-                " or ".join(NAMES[key]),
-            )
-        try:
-            return np.asarray(self.file[name][()])
-        except DAMAGE as error:
-            raise refusal(
-                self.path, f"{name} cannot be read ({error})", "an intact file"
-            ) from error
-
-    def _scalars(self, key: str, n: int) -> np.ndarray:
-        return as_scalars(self.path, self._name(key), self._array(key), n)

@@ -40,6 +40,18 @@ def kept(particles=None, keeps=(1.0, 1.0), **columns):
     return conservation(history(**columns), particles or state(), scene, Baseline(1.0, 8.0))
 
 
+def test_matter_at_rest_without_energy_has_changes_of_zero():
+    still = SimpleNamespace(
+        velocity=np.zeros((2, 3)), mass=np.ones(3), density=np.ones(3), internal_energy=np.zeros(3)
+    )
+    columns = {name: [0.0, 0.0] for name in ("momentum_x", "momentum_y", "energy_injected")}
+    formulation = SimpleNamespace(sound_speed=lambda state: np.zeros(3))
+    scene = SimpleNamespace(keeps_momentum=np.ones(2), formulation=formulation)
+    found = conservation(history(**columns), still, scene, Baseline(0.0, 0.0))
+    assert found["momentum_change"] == 0.0
+    assert found["energy_injected"] == 0.0
+
+
 def test_energy_drift_reports_last_and_largest():
     found = kept()
     assert found["energy_drift"] == 0.01

@@ -44,4 +44,6 @@ def test_problem_file_in_document_runs(tmp_path, monkeypatch):
     run = sph.open("runs/my")
     assert run.config.problem.pulse == 3.0
     # a pulse of 3 against 1 drives a shock of some Mach 1.5 or less: the gas moves below 1.2
+    drawn = CliRunner().invoke(main, ["plot", "runs/my"])
+    assert drawn.exit_code == 0, drawn.output
     assert 0.3 < run.history["highest_speed"].max() < 1.2

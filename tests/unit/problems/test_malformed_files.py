@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from sph import config
-from sph.errors import FileError
+from sph.errors import ConfigError, FileError
 
 
 def load(path, keys=""):
@@ -123,6 +123,25 @@ def test_file_without_layout_is_refused(messages, tmp_path):
     ic_files.write_hdf5(path, datasets, header)
     with messages.raised(FileError, "holds no particle"):
         load(path)
+
+
+def test_dataset_without_end_is_refused_before_it_fills_memory(tmp_path):
+    path = ic_files.write_hdf5(tmp_path / "ic.hdf5", *ic_files.tables(ic_files.particles()))
+    with h5py.File(path, "a") as file:
+        del file["PartType0/Coordinates"]
+        file["PartType0"].create_dataset("Coordinates", (10**12, 3), "f8", chunks=(10, 3))
+    with pytest.raises(FileError, match="at most 100000000 particles"):
+        load(path)
+
+
+@pytest.mark.parametrize("path", ["a\\u0000b", "a\\nb", ""])
+def test_path_that_names_no_file(path):
+    text = f'[problem]\nname = "file"\npath = "{path}"\n'
+    if not path:  # the sample
+        assert config.from_text(text).problem.n == 1024
+        return
+    with pytest.raises(ConfigError, match=r"line 3: problem.path = .* expected printable UTF-8"):
+        config.from_text(text)
 
 
 def test_file_that_is_not_hdf5_is_refused(messages, tmp_path):
