@@ -79,6 +79,7 @@ class Problem(Section):
                  a reference solution from another method
       profiled   whether figures show profiles over x or over the distance; otherwise, maps
       profiles   the four fields of these profiles; solids have "stress", which is -sigma_xx
+      title      name of the problem in figures; if empty, the key `name` without underscores
     """
 
     restart: ClassVar[str | None] = "refused"
@@ -90,6 +91,7 @@ class Problem(Section):
     truth: ClassVar[tuple[str, str]] = ("the exact solution", "exact")
     profiled: ClassVar[bool] = True
     profiles: ClassVar[tuple[str, ...]] = ("density", "velocity", "pressure", "internal_energy")
+    title: ClassVar[str] = ""
 
     name: str = Field(description="name of the problem; `sph list` shows all problems")
     dimension: int = Field(ge=1, le=3, description="number of space dimensions")
@@ -123,6 +125,11 @@ class Problem(Section):
     def centre(self) -> np.ndarray:
         """(D,) centre of the box."""
         return self.box.mean(axis=1)
+
+    @property
+    def drift(self) -> np.ndarray:
+        """(D,) uniform velocity of the centre of a radial solution."""
+        return np.zeros(self.dimension)
 
     def under(self, physics):
         """Return the problem with what it takes from [physics], such as the constant G of gravity.
@@ -221,6 +228,10 @@ class Problem(Section):
         Called only if `departs` returns None.
         """
         return {}
+
+
+# The `profiles` of gas or solids that rotate about `centre` in 2-D.
+ROTATION = ("density", "v_phi", "v_r", "pressure")
 
 
 def other_physics(physics, besides: str = "") -> str | None:

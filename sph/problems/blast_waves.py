@@ -43,6 +43,7 @@ class Problem(base.Problem):
             0.05, "measured: 0.034, and 0.060 with the averaged gradient of grad_h"
         ),
     }
+    title: ClassVar = "colliding blast waves"
 
     name: Literal["blast_waves"] = "blast_waves"
     dimension: Literal[1] = Field(default=1, description="number of space dimensions")

@@ -40,6 +40,7 @@ class Problem(base.Problem):
             1.0, "the wind cannot accelerate the cloud beyond the wind's speed"
         ),
     }
+    title: ClassVar = "cloud in a wind"
 
     name: Literal["blob"] = "blob"
     dimension: Literal[2, 3] = Field(default=2, description="number of space dimensions")

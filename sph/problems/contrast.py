@@ -38,6 +38,7 @@ class Problem(base.Problem):
             "kernels smooth the kink of the density at a mirror: 20 % there, 1 % in the L1 norm",
         ),
     }
+    title: ClassVar = "density contrast at rest"
 
     name: Literal["contrast"] = "contrast"
     dimension: Annotated[int, _SHARED["dimension"]] = 1

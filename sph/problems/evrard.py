@@ -55,6 +55,7 @@ class Problem(base.Problem):
         "internal_maximum_error": base.Limit(0.36, f"{_FIRST_ORDER}: 0.31 measured"),
         "kinetic_maximum_error": base.Limit(0.57, f"{_FIRST_ORDER}: 0.52 measured"),
     }
+    title: ClassVar = "Evrard collapse"
 
     name: Literal["evrard"] = "evrard"
     dimension: Literal[3] = Field(default=3, description="number of space dimensions")

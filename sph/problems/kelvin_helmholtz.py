@@ -39,6 +39,7 @@ class Problem(base.Problem):
             1e-3, "subsonic flow in pressure equilibrium, with less work than in a shock tube"
         )
     }
+    title: ClassVar = "Kelvin-Helmholtz instability"
 
     name: Literal["kelvin_helmholtz"] = "kelvin_helmholtz"
     dimension: Literal[2] = Field(default=2, description="number of space dimensions")

@@ -50,6 +50,7 @@ class Problem(base.Problem):
     swamped: ClassVar = {
         "growth_ratio": base.Limit(0.25, "a quarter of the linear growth rate", at_least=True)
     }
+    title: ClassVar = "Kelvin-Helmholtz instability, smooth layer"
 
     name: Literal["kelvin_helmholtz_smooth"] = "kelvin_helmholtz_smooth"
     dimension: Literal[2] = Field(default=2, description="number of space dimensions")

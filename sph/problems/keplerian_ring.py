@@ -40,6 +40,9 @@ class Problem(base.Problem):
             1e-3, "circular orbits, on which kinetic and potential energy are constant"
         ),
     }
+    radial: ClassVar = True
+    profiles: ClassVar = base.ROTATION
+    title: ClassVar = "Keplerian ring"
 
     name: Literal["keplerian_ring"] = "keplerian_ring"
     dimension: Literal[2] = Field(default=2, description="number of space dimensions")

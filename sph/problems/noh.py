@@ -46,6 +46,7 @@ class Problem(base.Problem):
         "planar_norm_pressure": base.Limit(0.006, "an independent implementation gives 0.0052"),
         "planar_norm_velocity": base.Limit(0.008, "an independent implementation gives 0.0070"),
     }
+    title: ClassVar = "Noh implosion"
 
     name: Literal["noh"] = "noh"
     dimension: Annotated[int, _SHARED["dimension"]] = 1

@@ -25,6 +25,7 @@ class Problem(base.Problem):
         "energy_drift": base.Limit(1e-3, "error of the leapfrog in any flow"),
         "momentum_change": base.Limit(1e-12, "pair forces are equal and opposite: only round-off"),
     }
+    title: ClassVar = "individual particles"
 
     name: Literal["particles"] = "particles"
     dimension: Annotated[int, _SHARED["dimension"]] = 1

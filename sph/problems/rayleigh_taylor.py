@@ -57,6 +57,7 @@ class Problem(base.Problem):
     swamped: ClassVar = {
         "growth_ratio": base.Limit(0.25, "a quarter of the linear growth rate", at_least=True)
     }
+    title: ClassVar = "Rayleigh-Taylor instability"
 
     name: Literal["rayleigh_taylor"] = "rayleigh_taylor"
     dimension: Literal[2] = Field(default=2, description="number of space dimensions")

@@ -44,6 +44,7 @@ class Problem(base.Problem):
         "stress_error": base.Limit(0.05, "measured: 0.027; kernels at the rim"),
     }
     radial: ClassVar = True
+    profiles: ClassVar = base.ROTATION
 
     name: Literal["rotating_disc"] = "rotating_disc"
     dimension: Literal[2] = Field(default=2, description="number of space dimensions")

@@ -46,6 +46,7 @@ class Problem(base.Problem):
             1e-4, "a shock of moderate strength, as in the shock tubes, which have 1e-5"
         )
     }
+    title: ClassVar = "Shu-Osher tube"
 
     name: Literal["shu_osher"] = "shu_osher"
     dimension: Literal[1] = Field(default=1, description="number of space dimensions")

@@ -35,6 +35,7 @@ class Problem(base.Problem):
             1e-4, "nearly at rest: kinetic energy stays below about 1e-3 of the total"
         )
     }
+    title: ClassVar = "square at rest"
 
     name: Literal["square"] = "square"
     dimension: Literal[2] = Field(default=2, description="number of space dimensions")

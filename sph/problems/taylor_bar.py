@@ -43,6 +43,7 @@ class Problem(base.Problem):
         "radius_error": base.Limit(0.08, "4 % thinner than finite elements was measured"),
     }
     profiled: ClassVar = False
+    title: ClassVar = "Taylor bar"
 
     name: Literal["taylor_bar"] = "taylor_bar"
     dimension: Literal[2, 3] = Field(default=3, description="number of space dimensions")

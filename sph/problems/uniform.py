@@ -28,6 +28,7 @@ class Problem(base.Problem):
             1e-10, "forces on a lattice cancel: round-off of a few hundred steps, with a margin"
         )
     }
+    title: ClassVar = "uniform gas"
 
     name: Literal["uniform"] = "uniform"
     dimension: Annotated[int, _SHARED["dimension"]] = 2

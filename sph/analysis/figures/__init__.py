@@ -58,7 +58,8 @@ def comparison(states: Sequence[State], names: Sequence[str]) -> Figure:
 def _kind(state: State) -> str:
     if not _shows_profiles(state):
         return "maps"
-    return "profiles over the radius" if state.is_radial else "profiles along x"
+    names = ", ".join(state.problem.profiles)
+    return f"profiles of {names} {'over the radius' if state.is_radial else 'along x'}"
 
 
 def _shows_profiles(state: State) -> bool:
@@ -80,16 +81,16 @@ def _pictures(source: Source, run: RunDirectory):
     states = source.over_time(MOST_TIMES)
     if _shows_profiles(last) or last.dimension == 3:
         yield "profiles", profiles.single(last)
-    if last.dimension == 1:
-        yield "evolution", profiles.over_time(list(states))
-    else:
+    if last.dimension > 1:
         yield "slice" if last.dimension == 3 else "map", maps.single(last)
-        yield "evolution", maps.over_time(states)
+    in_profiles = last.dimension == 1 or last.is_radial
+    yield "evolution", (profiles if in_profiles else maps).over_time(states)
     if run.history.exists():
         steps = read_history(run.history)
         if steps["t"].size:
             theory = truth.theory(last.checkpoint.config, steps["t"])
-            yield "history", history.figure(steps, last.title, theory)
+            mass = float(last.particles.mass.sum())
+            yield "history", history.figure(steps, last.title, theory, mass)
 
 
 def _check_format(target: Path) -> None:

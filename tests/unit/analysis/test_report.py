@@ -527,6 +527,11 @@ def test_pictures_show_every_run(study):
     guides = [line for line in panel.lines if line.get_linestyle() == ":"]
     slopes = [front.slope(*map(np.asarray, line.get_data())) for line in guides]
     assert slopes == pytest.approx([-0.5, -1.0], rel=ROUND_OFF)
+    for (start, end), (top, bottom) in (line.get_data() for line in guides):
+        level = np.interp(np.log(report.cost), np.log([start, end]), np.log([top, bottom]))
+        inside = (report.cost >= start) & (report.cost <= end)
+        assert inside.any()
+        assert (level > np.log(report.error))[inside].all()  # no line crosses a curve
     panel = pictures.error_against_number(report).axes[0]
     assert any(line.get_label() == r"$\alpha$ = 1.0: order 1.00" for line in panel.lines)
     bars = pictures.phases(report).axes[0].containers
