@@ -68,9 +68,9 @@ def _momentum_scale(history, mass: float) -> float:
 
 
 def _legend_above(panel, **settings) -> None:
-    """Where it covers no data."""
+    """Where it covers neither data nor, on the left, the power of ten of an axis."""
     panel.legend(
-        loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=4, borderaxespad=0.1,
+        loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=4, borderaxespad=0.1,
         columnspacing=0.9, handletextpad=0.3, fontsize=9, **settings,
     )  # fmt: skip
 

@@ -45,19 +45,19 @@ def over_time(states: Iterable[State]) -> Figure:
     `states` is iterated twice, so that few are in memory: the frame holds the gas of all times.
     """
     plane = common_plane(states, PIXELS_OF_MANY)
-    return _side_by_side([_drawn(state, plane, state.when, state.title) for state in states])
+    return side_by_side([drawn(state, plane, state.when, state.title) for state in states])
 
 
 def compared(states: Iterable[State], labels: Sequence[str]) -> Figure:
     """The main field of several runs, in one scale of colours."""
-    drawn = [
-        _drawn(
+    images = [
+        drawn(
             state, plane_of(state, PIXELS_OF_MANY), f"{style.plain(label)}, {state.when}",
             state.name,
         )
         for state, label in zip(states, labels, strict=True)
     ]  # fmt: skip
-    return _side_by_side(drawn)
+    return side_by_side(images)
 
 
 def main_field(state: State) -> str:
@@ -122,29 +122,31 @@ class _Map(NamedTuple):
     what: str  # for the title
 
 
-def _drawn(state: State, plane: Plane, label: str, what: str) -> _Map:
-    field = main_field(state)
+def drawn(state: State, plane: Plane, label: str, what: str, field: str | None = None) -> _Map:
+    """The map of `field`, by default the main field, on `plane`."""
+    field = field or main_field(state)
     (values,), opacity = _images(state, [field], plane)
     return _Map(values, opacity, field, plane, label, what + _where(plane))
 
 
-def _side_by_side(drawn: Sequence[_Map]) -> Figure:
-    scale = style.scale(np.concatenate([one.values.ravel() for one in drawn]))
-    columns, width, height = _arrangement(drawn[0].plane, len(drawn), WIDEST)
-    rows = -(-len(drawn) // columns)
+def side_by_side(maps: Sequence[_Map], scale=None) -> Figure:
+    """Maps in rows, in one scale of colours, by default one that suits all values."""
+    scale = scale or style.scale(np.concatenate([one.values.ravel() for one in maps]))
+    columns, width, height = _arrangement(maps[0].plane, len(maps), WIDEST)
+    rows = -(-len(maps) // columns)
     figure = style.new_figure(columns * width + 1.2, rows * (height + 0.35) + 0.8, "compressed")
     panels = figure.subplots(rows, columns, squeeze=False)
-    for panel, one in zip(panels.flat, drawn, strict=False):
+    for panel, one in zip(panels.flat, maps, strict=False):
         image = _show(panel, one.values, one.opacity, one.plane, one.field, scale)
         panel.set_title(textwrap.fill(one.label, LONGEST_TITLE))
-    shown, empty = np.split(panels.ravel(), [len(drawn)])
+    shown, empty = np.split(panels.ravel(), [len(maps)])
     for panel in empty:
         panel.remove()
-    _label_axes(panels, len(drawn), differ=len({one.plane.extent for one in drawn}) > 1)
+    _label_axes(panels, len(maps), differ=len({one.plane.extent for one in maps}) > 1)
     bar = figure.colorbar(image, ax=list(shown), pad=0.015, aspect=30, extend=_extends(image))
-    fields = sorted({one.field for one in drawn})
+    fields = sorted({one.field for one in maps})
     bar.set_label(", ".join(style.label(name) for name in fields))
-    figure.suptitle("; ".join(sorted({one.what for one in drawn})))
+    figure.suptitle("; ".join(sorted({one.what for one in maps})))
     return figure
 
 

@@ -8,7 +8,7 @@ from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 
 from sph.analysis.figures import style
-from sph.analysis.figures.profile import Profile, has_small_signal, profile
+from sph.analysis.figures.profile import SMALL_SIGNAL, Profile, has_small_signal, profile
 from sph.analysis.figures.sources import State
 
 LONGEST_TITLE = 90  # letters in a line
@@ -182,7 +182,8 @@ def _note(panel, name: str, drawn, errors, off_mean: Sequence[Profile]) -> None:
     ]
     for k, one in enumerate(off_mean[: len(noted)]):
         mean, exact = one.means(name)
-        noted[k] = noted[k][0], f"{noted[k][1]}\nmean {100.0 * (mean / exact - 1.0):+.2g} %"
+        if abs(off := mean / exact - 1.0) > SMALL_SIGNAL[0]:
+            noted[k] = noted[k][0], f"{noted[k][1]}\nmean {100.0 * off:+.2g} %"
     if noted:
         panel.legend(*zip(*noted, strict=True), loc="best", markerscale=2.0, handletextpad=0.4)
 

@@ -39,6 +39,18 @@ class Source:
         """The last state. Raises FileError."""
         return State(checkpoint.read(self.checkpoints[-1]))
 
+    def state(self, k: int) -> "State":
+        """The state of checkpoint `k`. Raises FileError."""
+        return State(checkpoint.read(self.checkpoints[k]))
+
+    def nearest(self, time: float) -> int:
+        """The number of the checkpoint nearest to `time`. Raises FileError."""
+        return int(np.argmin(np.abs(self._times - time)))
+
+    @cached_property
+    def _times(self) -> np.ndarray:
+        return np.array([checkpoint.read(path).time for path in self.checkpoints])
+
     def over_time(self, most: int) -> "States":
         """The first, the last and others between them, at most `most`, as even as that allows."""
         return States([self.checkpoints[i] for i in evenly(len(self.checkpoints), most)])

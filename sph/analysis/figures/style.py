@@ -36,8 +36,8 @@ TITLES = {
 AXES = {"x": "$x$", "r": "distance from the centre $r$"}
 # Perceptually uniform, one a field, so that a reader does not take one for another.
 MAPS = {
-    "density": "viridis", "pressure": "inferno", "speed": "cividis", "plastic_strain": "magma",
-    "von_mises": "plasma",
+    "density": "viridis", "pressure": "inferno", "internal_energy": "bone", "speed": "cividis",
+    "plastic_strain": "magma", "von_mises": "plasma",
 }  # fmt: skip
 VACUUM = "0.85"
 MOST_DECADES = 4
@@ -71,9 +71,9 @@ SETTINGS: dict[Any, Any] = {
 
 
 @contextmanager
-def paper():
-    """The settings of all pictures, within the block."""
-    with matplotlib.rc_context(SETTINGS):
+def paper(dpi: int | None = None):
+    """The settings of all pictures, within the block. dpi: of files, by default DPI."""
+    with matplotlib.rc_context(SETTINGS | ({"savefig.dpi": dpi} if dpi else {})):
         yield
 
 

@@ -12,6 +12,7 @@ from sph import config, kernels, registry
 from sph.analysis import errors, figures
 from sph.analysis.figures import history, maps, profiles, style
 from sph.analysis.figures.sources import State, evenly, find_source, von_mises
+from sph.analysis.figures.view import View, figure, states_at
 from sph.analysis.interpolate import with_cover
 from sph.errors import ConfigError, FileError
 from sph.output import checkpoint
@@ -562,6 +563,50 @@ def test_thin_domain_is_stretched_and_says_so():
     picture = maps.single(state_of("uniform", "problem.domain=[[0.0, 100.0], [0.0, 1.0]]"))
     assert "not to scale" in picture.get_suptitle()
     assert picture.axes[0].get_aspect() == pytest.approx(100.0 / maps.WIDEST_RATIO)
+
+
+# --- options of maps ----------------------------------------------------------------------------
+
+
+def test_view_sets_field_scale_and_part(shear):
+    source = find_source(shear.path)
+    states = states_at(source, [0.4, 0.1, 0.45])
+    assert [state.time for state in states] == [0.0, 0.5]
+    view = View("pressure", (2.0, 3.0), True, (0.1, 0.4, -0.2, 0.0))
+    images = [panel.images[0] for panel in figure(states, view).axes if panel.images]
+    assert len(images) == 2
+    for image, state in zip(images, states, strict=True):
+        assert image.get_extent() == [0.1, 0.4, -0.2, 0.0]
+        assert isinstance(image.norm, LogNorm)
+        assert (image.norm.vmin, image.norm.vmax) == (2.0, 3.0)
+        pressure = state.scalar("pressure")
+        shown = np.ma.getdata(image.get_array())
+        assert pressure.min() <= shown.min() < shown.max() <= pressure.max()
+
+
+def test_views_draw_one_picture_each(shear, tube, tmp_path):
+    assert figures.draw([shear.path], view=View("speed")) == [shear.figures / "map_of_speed.png"]
+    assert figures.draw([tube.path], times=[0.1]) == [tube.figures / "profiles_at_times.png"]
+    sizes = []
+    for dpi in (40, 80):
+        (path,) = figures.draw([shear.path], tmp_path / "a.png", View("density"), dpi=dpi)
+        sizes.append(imread(path).shape[1])
+    assert sizes[1] == pytest.approx(2 * sizes[0], abs=4)
+
+
+@pytest.mark.parametrize(
+    "view",
+    [View("von_mises"), View(limits=(2.0, 1.0)), View(limits=(0.0, 1.0), is_log=True),
+     View(zoom=(0.0, 1.0, 1.0, 0.0))],
+)  # fmt: skip
+def test_view_that_cannot_be_drawn_is_refused(messages, shear, view):
+    with messages.raised(ConfigError):
+        figures.draw([shear.path], view=view)
+
+
+def test_map_of_line_is_refused(messages, tube):
+    with messages.raised(ConfigError):
+        figures.draw([tube.path], view=View("density"))
 
 
 # --- history ----------------------------------------------------------------------------------
