@@ -183,6 +183,20 @@ def test_order_2d_is_in_particle_spacing(tmp_path):
     assert line.order == pytest.approx(2.0, rel=ROUND_OFF)
 
 
+def test_cost_that_grows_more_slowly_than_n_gives_no_exponent(tmp_path):
+    from sph.analysis.figures.report_labels import power
+
+    for n, cost in ((100, 0.2), (200, 0.25), (400, 0.3)):
+        write_run(tmp_path / "s" / str(n), 100 / n, cost, [f"problem.n={n}"])
+    report = compared(tmp_path / "s")
+    (line,) = report.series
+    assert line.exponent is None
+    assert line.order == pytest.approx(1.0, rel=ROUND_OFF)
+    assert power(line) == "fixed costs dominate"
+    assert "fixed costs dominate these short runs" in said(report)
+    assert "error ∝" not in said(report)
+
+
 def test_words_state_orders_front_and_excess(study):
     text = said(compared(study))
     assert "L1 error of density, plotted against CPU time without compilation" in text
