@@ -106,3 +106,24 @@ def test_table_has_a_line_for_results_and_failures(peers, tmp_path):
     assert lines[3] == "| Rubber rings | PySPH | 1100 | **crashed (SIGSEGV)** | | | |"
     assert len({line.count("|") for line in lines}) == 1
     assert len(json.loads((tmp_path / "solids.json").read_text())) == 2
+
+
+def test_every_size_of_every_setting_runs_after_a_short_run_that_compiles(
+    peers, tmp_path, monkeypatch, capsys
+):
+    calls = []
+
+    def run(case, n, *rest, share=1.0, **_):
+        calls.append((n, share))
+        return {"number": n, "steps": 1, "cpu_seconds": 1.0, "process_seconds": 2.0, "figures": {}}
+
+    monkeypatch.setattr(peers, "own_run", run)
+    monkeypatch.setattr(peers, "pysph_run", run)
+    monkeypatch.setattr(peers, "require_pysph", lambda python: None)
+    monkeypatch.setattr(sys, "argv", ["peers_solids.py", "--only", "rings", "-o", str(tmp_path)])
+    peers.main()
+    case = peers.CASES["rings"]
+    sizes = [(case.sizes[0], peers.SHORT), *((n, 1.0) for n in case.sizes)]
+    assert calls == sizes * (len(case.settings) + 1)
+    table = (tmp_path / "solids.md").read_text().splitlines()[2:]
+    assert capsys.readouterr().out.splitlines()[: len(table)] == table

@@ -24,7 +24,7 @@ BODY = Field(
 )
 
 # Parts of the supports within which links are searched, until a body is found to be in one piece.
-# Half the support holds the nearest neighbours only, and the search costs a tenth.
+# Half the support holds the nearest neighbours only, and the search costs a fifth in 3-D.
 SHARES = (0.5, 1.0)
 NAMED = 4  # pieces whose sizes a message lists
 
