@@ -26,6 +26,7 @@ STEPS = 300
 
 # Sizes at which every scene takes seconds.
 SMALL = {
+    "billows": ["problem.n=4096"],
     "blob": ["problem.n=2500"],
     "bodies": ["problem.n=600"],
     "contrast_graded": ["problem.n=2000"],

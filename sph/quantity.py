@@ -39,6 +39,8 @@ FIELDS = {
     "density": Quantity("density", DENSITY),
     "velocity": Quantity("velocity along the coordinate of the profile", VELOCITY),
     "velocity_phi": Quantity("velocity across the radius", VELOCITY),
+    "v_r": Quantity("velocity along the radius", VELOCITY),
+    "v_phi": Quantity("velocity across the radius, anticlockwise", VELOCITY),
     "speed": Quantity("size of the velocity", VELOCITY),
     "pressure": Quantity("pressure", PRESSURE),
     "internal_energy": Quantity("internal energy per unit mass", SPECIFIC_ENERGY),

@@ -77,6 +77,17 @@ def onto_plane(
 
     NaN where the sum of V W is at most `least`; it is 1 inside matter and 1/2 at a plane surface.
     """
+    means, cover = with_cover(values, particles, domain, kernel, plane)
+    return np.where(cover > least, means, np.nan)
+
+
+def with_cover(
+    values: np.ndarray, particles, domain: Domain, kernel, plane: Plane
+) -> tuple[np.ndarray, np.ndarray]:
+    """Scalar fields (F, N) at the centres of the pixels, (F, ny, nx), and sum V W (ny, nx) there.
+
+    Fields are NaN where no kernel reaches.
+    """
     values = np.ascontiguousarray(values, dtype=np.float64)
     H, weight = particles.support, _weight(particles)
     step = (plane.high - plane.low) / np.array(plane.shape)
@@ -92,7 +103,7 @@ def onto_plane(
                 kernel, (0,) * particles.dimension, image[:2, near], depth[near], H[near],
                 weight[near], values[:, near], first, step, total, sums,
             )  # fmt: skip
-    return _means(sums, total, least / normalisation(kernel, (0,) * particles.dimension))
+    return _means(sums, total), total * normalisation(kernel, (0,) * particles.dimension)
 
 
 def _weight(particles) -> np.ndarray:
@@ -100,10 +111,10 @@ def _weight(particles) -> np.ndarray:
     return particles.mass / (particles.density * particles.support**particles.dimension)
 
 
-def _means(sums: np.ndarray, total: np.ndarray, least: float = 0.0) -> np.ndarray:
-    """sums (F, …) over the sum of weights (…), NaN where that is at most `least`."""
+def _means(sums: np.ndarray, total: np.ndarray) -> np.ndarray:
+    """sums (F, …) over the sum of weights (…), NaN where that is zero."""
     with np.errstate(invalid="ignore"):
-        return np.where(total > least, sums / total, np.nan)
+        return np.where(total > 0.0, sums / total, np.nan)
 
 
 def _reaches(position, depth, H, plane: Plane) -> np.ndarray:

@@ -86,6 +86,7 @@ class Problem(Section):
       quantities meaning and unit of the columns of `diagnostics` and of the figures of `report`,
                  `compare` and `over_time`, by name; see `sph.quantity.meaning`
       profiles   the four fields of these profiles; solids have "stress", which is -sigma_xx
+      title      name of the problem in figures; if empty, the key `name` without underscores
     """
 
     restart: ClassVar[str | None] = "refused"
@@ -100,6 +101,7 @@ class Problem(Section):
     filled_in: ClassVar[tuple[str, ...]] = ()
     profiled: ClassVar[bool] = True
     profiles: ClassVar[tuple[str, ...]] = ("density", "velocity", "pressure", "internal_energy")
+    title: ClassVar[str] = ""
 
     name: str = Field(description="name of the problem; `sph list` shows all problems")
     dimension: int = Field(ge=1, le=3, description="number of space dimensions")
@@ -142,6 +144,11 @@ class Problem(Section):
     def centre(self) -> np.ndarray:
         """(D,) centre of the box."""
         return self.box.mean(axis=1)
+
+    @property
+    def drift(self) -> np.ndarray:
+        """(D,) uniform velocity of the centre of a radial solution."""
+        return np.zeros(self.dimension)
 
     def under(self, physics):
         """Return the problem with what it takes from [physics], such as the constant G of gravity.
@@ -240,6 +247,10 @@ class Problem(Section):
         Called only if `departs` returns None.
         """
         return {}
+
+
+# The `profiles` of gas or solids that rotate about `centre` in 2-D.
+ROTATION = ("density", "v_phi", "v_r", "pressure")
 
 
 def other_physics(physics, besides: str = "") -> str | None:

@@ -49,6 +49,7 @@ class Problem(base.Problem):
         "peak_density": Quantity("largest density of a particle", units.DENSITY),
         "density_L1_relative": Quantity("sum of V |error of rho| over the sum of V rho, exact"),
     }
+    title: ClassVar = "colliding blast waves"
 
     name: Literal["blast_waves"] = "blast_waves"
     dimension: Literal[1] = Field(default=1, description="number of space dimensions")

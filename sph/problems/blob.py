@@ -50,6 +50,7 @@ class Problem(base.Problem):
         ),
         "growth_times": Quantity("time in units of the growth time of Kelvin-Helmholtz waves"),
     }
+    title: ClassVar = "cloud in a wind"
 
     name: Literal["blob"] = "blob"
     dimension: Literal[2, 3] = Field(default=2, description="number of space dimensions")

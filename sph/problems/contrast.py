@@ -45,6 +45,7 @@ class Problem(base.Problem):
         "support_ratio": Quantity("largest over smallest support radius"),
         "pressure_error": Quantity("largest |P/P_0 - 1|"),
     }
+    title: ClassVar = "density contrast at rest"
 
     name: Literal["contrast"] = "contrast"
     dimension: Annotated[int, _SHARED["dimension"]] = 1

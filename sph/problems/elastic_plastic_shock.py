@@ -36,6 +36,7 @@ class Problem(flyer_plate.Problem):
         "shock_speed_error": base.Limit(0.02, "measured: 3.4e-4 with 600 particles"),
         "shock_stress_error": base.Limit(0.02, "measured: 3.1e-4 with 600 particles"),
     }
+    title: ClassVar = "elastic-plastic shock"
 
     name: Literal["elastic_plastic_shock"] = "elastic_plastic_shock"  # type: ignore[assignment]
     n: Annotated[int, base.Problem.model_fields["n"]] = 600

@@ -76,6 +76,7 @@ class Problem(base.Problem):
         },
         to="reference",
     )
+    title: ClassVar = "Evrard collapse"
 
     name: Literal["evrard"] = "evrard"
     dimension: Literal[3] = Field(default=3, description="number of space dimensions")

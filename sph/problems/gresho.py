@@ -52,6 +52,9 @@ class Problem(_relax.Relaxable):
             "peak_v_phi, computed from exact velocities at the particles", units.VELOCITY
         ),
     }
+    radial: ClassVar = True
+    profiles: ClassVar = base.ROTATION
+    title: ClassVar = "Gresho vortex"
 
     name: Literal["gresho"] = "gresho"
     dimension: Literal[2] = Field(default=2, description="number of space dimensions")
@@ -76,6 +79,10 @@ class Problem(_relax.Relaxable):
         default="cubic",
         description='initial lattice: "cubic", "hexagonal", or "relaxed", a disordered glass',
     )
+
+    @property
+    def drift(self) -> np.ndarray:
+        return np.array(self.velocity)
 
     def initial(self, eos) -> base.InitialState:
         position = self.on_glass(placement.fill(self.box, self.n, self.lattice))

@@ -47,6 +47,7 @@ class Problem(base.Problem):
         ),
         "growth_time": Quantity("growth time of the mode in linear theory", units.TIME),
     }
+    title: ClassVar = "Kelvin-Helmholtz instability"
 
     name: Literal["kelvin_helmholtz"] = "kelvin_helmholtz"
     dimension: Literal[2] = Field(default=2, description="number of space dimensions")

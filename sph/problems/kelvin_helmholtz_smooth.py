@@ -62,6 +62,7 @@ class Problem(_relax.Relaxable):
         ),
         "growth_ratio": Quantity("growth_rate over linear_growth_rate"),
     }
+    title: ClassVar = "Kelvin-Helmholtz instability, smooth layer"
 
     name: Literal["kelvin_helmholtz_smooth"] = "kelvin_helmholtz_smooth"
     dimension: Literal[2] = Field(default=2, description="number of space dimensions")

@@ -54,6 +54,9 @@ class Problem(base.Problem):
             "periods of the middle of the ring"
         ),
     }
+    radial: ClassVar = True
+    profiles: ClassVar = base.ROTATION
+    title: ClassVar = "Keplerian ring"
 
     name: Literal["keplerian_ring"] = "keplerian_ring"
     dimension: Literal[2] = Field(default=2, description="number of space dimensions")

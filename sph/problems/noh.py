@@ -77,6 +77,7 @@ class Problem(base.Problem):
             "length^2 time^-1",
         ),
     }
+    title: ClassVar = "Noh implosion"
 
     name: Literal["noh"] = "noh"
     dimension: Annotated[int, _SHARED["dimension"]] = 1

@@ -38,6 +38,7 @@ class Problem(base.Problem):
             "plus the distance that the fastest particle travels"
         ),
     }
+    title: ClassVar = "individual particles"
 
     name: Literal["particles"] = "particles"
     dimension: Annotated[int, _SHARED["dimension"]] = 1

@@ -75,6 +75,7 @@ class Problem(base.Problem):
             "growth rate of the growing mode alone, in linear theory", units.RATE
         ),
     }
+    title: ClassVar = "Rayleigh-Taylor instability"
 
     name: Literal["rayleigh_taylor"] = "rayleigh_taylor"
     dimension: Literal[2] = Field(default=2, description="number of space dimensions")

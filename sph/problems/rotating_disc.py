@@ -68,6 +68,7 @@ class Problem(base.Problem):
             "mean size of the error of the stress over the largest stress, without the rim"
         ),
     }
+    profiles: ClassVar = base.ROTATION
 
     name: Literal["rotating_disc"] = "rotating_disc"
     dimension: Literal[2] = Field(default=2, description="number of space dimensions")

@@ -57,6 +57,7 @@ class Problem(base.Problem):
         ),
         "peak_density": Quantity("largest density from 1.9 to 0.1 behind the shock", units.DENSITY),
     }
+    title: ClassVar = "Shu-Osher tube"
 
     name: Literal["shu_osher"] = "shu_osher"
     dimension: Literal[1] = Field(default=1, description="number of space dimensions")

@@ -45,6 +45,7 @@ class Problem(base.Problem):
             "fraction of the dense particles outside the initial square; 0.09 for a disc"
         ),
     }
+    title: ClassVar = "square at rest"
 
     name: Literal["square"] = "square"
     dimension: Literal[2] = Field(default=2, description="number of space dimensions")

@@ -60,6 +60,7 @@ class Problem(base.Problem):
             "length ratio of the fit of Wilkins & Guinan (1973) to measurements, eq 458"
         ),
     }
+    title: ClassVar = "Taylor bar"
 
     name: Literal["taylor_bar"] = "taylor_bar"
     dimension: Literal[2, 3] = Field(default=3, description="number of space dimensions")

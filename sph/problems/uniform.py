@@ -34,6 +34,7 @@ class Problem(_relax.Relaxable):
         "energy_spread": Quantity("largest minus smallest internal energy, over the smallest"),
         "crossings": Quantity("distance moved along x, in lengths of the box"),
     }
+    title: ClassVar = "uniform gas"
 
     name: Literal["uniform"] = "uniform"
     dimension: Annotated[int, _SHARED["dimension"]] = 2

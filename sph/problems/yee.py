@@ -35,6 +35,9 @@ class Problem(base.Problem):
             1e-3, "a smooth flow, with the energy error of the time step only"
         ),
     }
+    radial: ClassVar = True
+    profiles: ClassVar = base.ROTATION
+    title: ClassVar = "isentropic vortex"
 
     name: Literal["yee"] = "yee"
     dimension: Literal[2] = Field(default=2, description="number of space dimensions")
@@ -53,6 +56,10 @@ class Problem(base.Problem):
         default="cubic",
         description='initial lattice: "cubic", "hexagonal", or "relaxed", a disordered glass',
     )
+
+    @property
+    def drift(self) -> np.ndarray:
+        return np.array(self.velocity)
 
     def initial(self, eos) -> base.InitialState:
         """Return a regular lattice whose masses follow the density.

@@ -140,7 +140,8 @@ class _Axis:
 
 
 def _scalars(problem) -> list[str]:
-    return [name for name in problem.profiles if name != "velocity"]
+    """Fields of the problem's profiles besides the velocity, whose components all tables have."""
+    return [name for name in problem.profiles if name not in ("velocity", "v_r", "v_phi")]
 
 
 def _scalar(checkpoint: Checkpoint, name: str) -> np.ndarray:

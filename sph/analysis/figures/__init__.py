@@ -8,6 +8,7 @@ from matplotlib.figure import Figure
 from sph.analysis import truth
 from sph.analysis.figures import history, maps, profiles, style
 from sph.analysis.figures.sources import Source, State, find_source, labels
+from sph.analysis.figures.view import View, figure, states_at
 from sph.errors import ConfigError
 from sph.output.files import explained, refuse_link, replacing
 from sph.output.history import read as read_history
@@ -17,19 +18,31 @@ FORMATS = ("png", "pdf", "svg")
 MOST_TIMES = 6
 
 
-def draw(sources: Sequence[Path], target: Path | None = None) -> list[Path]:
+def draw(
+    sources: Sequence[Path],
+    target: Path | None = None,
+    view: View | None = None,
+    times: Sequence[float] = (),
+    dpi: int | None = None,
+) -> list[Path]:
     """Draw runs or checkpoints; returns the files written.
 
     Without `target` a run gets a set of pictures in its figures/, a checkpoint one picture there,
     or beside it where it is in no run. With `target` the main picture of one source goes there, or
-    one picture that compares several; its suffix says in which format.
+    one picture that compares several; its suffix says in which format. With `view` or `times` each
+    source gets one picture of the checkpoints nearest to `times`, by default of the last: a map, or
+    profiles of a 1-D run. dpi: pixels per inch, by default style.DPI.
     Raises ConfigError for a suffix that is none of FORMATS and for sources that one picture cannot
     compare, FileError for what is missing, damaged or cannot be written.
     """
     if target is not None:
         _check_format(Path(target))
     found = [find_source(Path(path)) for path in sources]
-    with style.paper():
+    with style.paper(dpi):
+        if view or times:
+            if target is not None and len(found) > 1:
+                raise ConfigError("options of maps and times need one source with -o.")
+            return [_draw_view(source, target, view or View(), times) for source in found]
         if target is None:
             return [path for source in found for path in _draw_own(source)]
         states = [source.last() for source in found]
@@ -58,7 +71,8 @@ def comparison(states: Sequence[State], names: Sequence[str]) -> Figure:
 def _kind(state: State) -> str:
     if not _shows_profiles(state):
         return "maps"
-    return "profiles over the radius" if state.is_radial else "profiles along x"
+    names = ", ".join(state.problem.profiles)
+    return f"profiles of {names} {'over the radius' if state.is_radial else 'along x'}"
 
 
 def _shows_profiles(state: State) -> bool:
@@ -74,23 +88,32 @@ def _draw_own(source: Source) -> list[Path]:
     return [_save(picture, run.figures / f"{name}.png") for name, picture in _pictures(source, run)]
 
 
+def _draw_view(source: Source, target: Path | None, view: View, times: Sequence[float]) -> Path:
+    states = states_at(source, times)
+    if states[-1].dimension == 1 and view == View():
+        picture, name = profiles.over_time(states), "profiles_at_times"
+    else:
+        picture, name = figure(states, view), f"map_of_{view.field or maps.main_field(states[-1])}"
+    directory = source.path.parent if source.run is None else source.run.figures
+    return _save(picture, Path(target or directory / f"{name}.png"))
+
+
 def _pictures(source: Source, run: RunDirectory):
     """(name, figure) of each picture of a run's set, one at a time to hold one in memory."""
     last = source.last()
     states = source.over_time(MOST_TIMES)
     if _shows_profiles(last) or last.dimension == 3:
         yield "profiles", profiles.single(last)
-    if last.dimension == 1:
-        yield "evolution", profiles.over_time(list(states))
-    else:
+    if last.dimension > 1:
         yield "slice" if last.dimension == 3 else "map", maps.single(last)
-        yield "evolution", maps.over_time(states)
+    in_profiles = last.dimension == 1 or last.is_radial
+    yield "evolution", (profiles if in_profiles else maps).over_time(states)
     if run.history.exists():
         steps = read_history(run.history)
         if steps["t"].size:
-            config = last.checkpoint.config
+            config, mass = last.checkpoint.config, float(last.particles.mass.sum())
             theory = truth.theory(config, steps["t"])
-            yield "history", history.figure(steps, last.title, theory, config)
+            yield "history", history.figure(steps, last.title, theory, config, mass)
 
 
 def _check_format(target: Path) -> None:

@@ -1,6 +1,7 @@
 """What a run kept and what its steps were, from its history."""
 
 import itertools
+from collections.abc import Sequence
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -21,6 +22,9 @@ ENERGIES = (
 LABELS = {"volume_ratio": r"$\sum m/\rho$ over the volume"}
 DECADE = 10.0  # a column that spans more is drawn on a logarithmic axis
 STYLES = ("-", "--", "-.")
+# Momentum that changes by less, in units of the momentum at which all energy would be kinetic, is
+# conserved to round-off of sums of many particles, and its panel would show noise.
+ROUND_OFF = 1e-12
 COLOURS = (*style.PALETTE, "black", "#999999", "#882255", "#44aa99", "#ddcc77")
 
 
@@ -29,40 +33,64 @@ def figure(
     title: str,
     theory: dict[str, np.ndarray] | None = None,
     config: Config | None = None,
+    mass: float = 0.0,
 ) -> Figure:
     """Energies, their drift, momentum, steps by what limited them, and the problem's diagnostics.
 
     `history` is that of `sph.output.history.read`; `theory` has what is said of its columns;
-    `config`, that of the run, has its units.
+    `config`, that of the run, has its units. Left out are diagnostics that are zero throughout, and
+    momentum that `mass`, the total, tells to be conserved to round-off: the title says so.
     """
     theory = theory or {}
     momentum = [name for name in history if name.startswith("momentum_")]
     shared = {*shared_columns(len(momentum)), *(name for name, *_ in ENERGIES)}
-    further = [name for name in history if name not in shared]
-    picture, panels = _panels(4 + len(further))
-    _energies(panels[0], history, theory)
-    _drift(panels[1], history)
-    _momentum(panels[2], history, momentum)
-    _steps(panels[3], history)
-    for panel, name in zip(panels[4:], further, strict=True):
+    further = [name for name in history if name not in shared and np.any(history[name] != 0.0)]
+    change = max(float(np.ptp(history[name])) for name in momentum)
+    is_conserved = change < ROUND_OFF * _momentum_scale(history, mass)
+    if is_conserved:
+        title += f"\nmomentum is conserved to round-off, within {style.number(change)}"
+    picture, panels = _panels(4 - is_conserved + len(further))
+    free = iter(panels)
+    _energies(next(free), history, theory)
+    _drift(next(free), history)
+    if not is_conserved:
+        _momentum(next(free), history, momentum)
+    _steps(next(free), history)
+    for panel, name in zip(free, further, strict=True):
         _diagnostic(panel, history, name, theory.get(name))
     if config is not None and config.units.are_given:
-        _add_units(panels, further, config)
+        moved = [] if is_conserved else ["momentum_x"]
+        _add_units(panels, ["total_energy", "energy_drift", *moved, "dt", *further], config)
     for panel in panels:
         if panel.get_subplotspec().is_last_row():
-            panel.set_xlabel(style.labelled("$t$", TIME, config.units) if config else "$t$")
+            panel.set_xlabel(
+                style.labelled("time $t$", TIME, config.units) if config else "time $t$"
+            )
         panel.margins(x=0.02)
     picture.suptitle(title)
     return picture
 
 
-def _add_units(panels, further: list[str], config: Config) -> None:
-    """Add its unit to the vertical axis of each panel. further: columns of those after four."""
-    columns = ("total_energy", "energy_drift", "momentum_x", "dt", *further)
+def _add_units(panels, columns: Sequence[str], config: Config) -> None:
+    """Add its unit to the vertical axis of each panel. columns: one shown by each."""
     for panel, name in zip(panels, columns, strict=True):
         known = meanings.of_column(config, name)
         if known is not None:
             panel.set_ylabel(style.labelled(panel.get_ylabel(), known.unit, config.units))
+
+
+def _momentum_scale(history, mass: float) -> float:
+    """(2 M E)^1/2 with the largest kinetic and internal energy."""
+    energy = np.max(history["kinetic_energy"] + np.maximum(history["internal_energy"], 0.0))
+    return float(np.sqrt(2.0 * mass * max(energy, 0.0)))
+
+
+def _legend_above(panel, **settings) -> None:
+    """Where it covers neither data nor, on the left, the power of ten of an axis."""
+    panel.legend(
+        loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=4, borderaxespad=0.1,
+        columnspacing=0.9, handletextpad=0.3, fontsize=9, **settings,
+    )  # fmt: skip
 
 
 def _panels(count: int):
@@ -83,8 +111,8 @@ def _energies(panel, history, theory) -> None:
     beside = [theory[name] for name, *_ in ENERGIES if name in theory]
     for values, label in itertools.zip_longest(beside, ["theory"][: len(beside)]):
         panel.plot(history["t"], values, "-", lw=0.6, color="black", label=label)
-    panel.set_ylabel("$E$")
-    panel.legend(loc="best")
+    panel.set_ylabel("energy $E$")
+    _legend_above(panel)
 
 
 def _drift(panel, history) -> None:
@@ -96,9 +124,10 @@ def _momentum(panel, history, names) -> None:
     for name, colour, dashes in zip(names, style.PALETTE, STYLES, strict=False):
         change = history[name] - history[name][0]
         panel.plot(history["t"], change, dashes, color=colour, label=f"${name[-1]}$")
-    panel.set_ylabel(r"$\mathbf{p} - \mathbf{p}_0$" if len(names) > 1 else "$p - p_0$")
+    change = r"$\mathbf{p} - \mathbf{p}_0$" if len(names) > 1 else "$p - p_0$"
+    panel.set_ylabel(f"change of momentum {change}")
     if len(names) > 1:
-        panel.legend(loc="best")
+        _legend_above(panel)
 
 
 def _steps(panel, history) -> None:
@@ -110,12 +139,12 @@ def _steps(panel, history) -> None:
         by = history["limiter"] == limiter
         panel.plot(
             history["t"][by], history["dt"][by], ".", ms=3, mew=0, color=colour,
-            label=limiter.replace("_", " "), rasterized=True,
+            label=f"by {limiter.replace('_', ' ')}", rasterized=True,
         )  # fmt: skip
     if history["dt"].max() > 10.0 * history["dt"].min():
         panel.set_yscale("log")
-    panel.set_ylabel(r"$\Delta t$")
-    panel.legend(loc="best", markerscale=3.0, title="limited by")
+    panel.set_ylabel(r"time step $\Delta t$")
+    _legend_above(panel, markerscale=3.0)
 
 
 def _diagnostic(panel, history, name: str, theory: np.ndarray | None) -> None:
@@ -123,7 +152,7 @@ def _diagnostic(panel, history, name: str, theory: np.ndarray | None) -> None:
     panel.plot(history["t"], values, color=style.PALETTE[0], label="this run")
     if theory is not None:
         panel.plot(history["t"], theory, "--", color="black", label="theory")
-        panel.legend(loc="best")
+        _legend_above(panel)
     panel.set_ylabel(LABELS.get(name, name.replace("_", " ")))
     if np.all(values > 0.0) and values.max() > DECADE * values.min():
         panel.set_yscale("log")

@@ -9,12 +9,13 @@ from matplotlib.figure import Figure
 
 from sph.analysis.figures import style
 from sph.analysis.figures.sources import State
-from sph.analysis.interpolate import Plane, onto_plane
+from sph.analysis.interpolate import Plane, with_cover
 
 PIXELS = 512  # on the longer side
 PIXELS_OF_MANY = 320
 LONGEST_SIDE = 3.6  # inches, of a map that stands with one other
 AT_SURFACE = 0.5  # sum of V W at a plane surface of matter that ends at its particles
+WIDEST_RATIO = 8.0  # of sides drawn to scale; thinner domains are stretched
 MOST_OUTLINES = 12  # bodies of which outlines are drawn
 LONGEST_TITLE = 40  # letters in a line above a map that stands with others
 WIDEST = 9.0  # inches, of a picture of many maps
@@ -24,34 +25,39 @@ def single(state: State) -> Figure:
     """Density and a second field at one time; for solids, plastic strain and stress."""
     names = (main_field(state), second_field(state))
     plane = plane_of(state, PIXELS)
-    images = _images(state, names, plane)
+    images, opacity = _images(state, names, plane)
     columns, width, height = _arrangement(plane, 2, 2 * LONGEST_SIDE)
     figure = style.new_figure(columns * (width + 1.0), 2 // columns * height + 1.0, "compressed")
     panels = figure.subplots(2 // columns, columns, squeeze=False)
     for panel, name, values in zip(panels.flat, names, images, strict=True):
-        image = _show(panel, values, plane, name, style.scale(values))
+        image = _show(panel, values, opacity, plane, name, style.scale(values))
         figure.colorbar(image, ax=panel, pad=0.02, extend=_extends(image))
         _outline(panel, state, plane)
-        symbol = state.labelled(style.SYMBOLS[name], name)
-        panel.set_title(f"{style.TITLES.get(name, name)} {symbol}")
+        panel.set_title(state.labelled(style.label(name), name))
     _label_axes(panels, 2, _axes(state))
     figure.suptitle(f"{state.title}, {state.when}{_where(plane)}")
     return figure
 
 
 def over_time(states: Iterable[State]) -> Figure:
-    """The main field of one run at several times, in one scale of colours."""
-    drawn = [_drawn(state, state.when, state.title) for state in states]
-    return _side_by_side(drawn)
+    """The main field of one run at several times, in one scale of colours and one frame.
+
+    `states` is iterated twice, so that few are in memory: the frame holds the gas of all times.
+    """
+    plane = common_plane(states, PIXELS_OF_MANY)
+    return side_by_side([drawn(state, plane, state.when, state.title) for state in states])
 
 
 def compared(states: Iterable[State], labels: Sequence[str]) -> Figure:
     """The main field of several runs, in one scale of colours."""
-    pairs = zip(states, labels, strict=True)
-    drawn = [
-        _drawn(state, f"{style.plain(label)}, {state.when}", state.name) for state, label in pairs
-    ]
-    return _side_by_side(drawn)
+    images = [
+        drawn(
+            state, plane_of(state, PIXELS_OF_MANY), f"{style.plain(label)}, {state.when}",
+            state.name,
+        )
+        for state, label in zip(states, labels, strict=True)
+    ]  # fmt: skip
+    return side_by_side(images)
 
 
 def main_field(state: State) -> str:
@@ -76,13 +82,32 @@ def second_field(state: State) -> str:
 
 
 def plane_of(state: State, pixels: int) -> Plane:
-    """The domain, or the middle of a 3-D one; along open axes as far as nearly all gas has gone."""
+    """The domain, or the middle of a 3-D one; along open axes as far as nearly all gas reaches."""
+    return _plane(_frame(state), state, pixels)
+
+
+def common_plane(states: Iterable[State], pixels: int) -> Plane:
+    """The plane that holds `plane_of` of all states, which are read one by one."""
+    frames = []
+    for state in states:
+        frames.append(_frame(state))
+    low, high = np.array(frames)[..., 0].min(axis=0), np.array(frames)[..., 1].max(axis=0)
+    return _plane(np.stack([low, high], axis=1), state, pixels)
+
+
+def _frame(state: State) -> np.ndarray:
+    """(D, 2) the domain; along open axes the range of nearly all gas with half a support radius."""
     box = state.problem.box.copy()
+    margin = 0.5 * np.median(state.particles.support)
     for axis, boundary in enumerate(state.problem.boundaries):
         if boundary == "open":
             low, high = np.percentile(state.particles.position[axis], [0.1, 99.9])
-            box[axis] = min(box[axis, 0], low), max(box[axis, 1], high)
-    plane = Plane.through_centre(box, pixels)
+            box[axis] = low - margin, high + margin
+    return box
+
+
+def _plane(frame: np.ndarray, state: State, pixels: int) -> Plane:
+    plane = Plane.through_centre(frame, pixels)
     return plane if plane.height is None else plane._replace(height=float(state.problem.centre[2]))
 
 
@@ -90,48 +115,63 @@ class _Map(NamedTuple):
     """A map of one field, which takes less memory than the state it is of."""
 
     values: np.ndarray  # (ny, nx)
+    opacity: np.ndarray | None  # (ny, nx)
     field: str
     plane: Plane
     label: str
     what: str  # for the title
-    symbol: str  # of the field, with its unit
+    quantity: str  # name, symbol and unit of the field
     axes: list[str]  # their labels
 
 
-def _drawn(state: State, label: str, what: str) -> _Map:
-    plane, field = plane_of(state, PIXELS_OF_MANY), main_field(state)
-    (values,) = _images(state, [field], plane)
-    symbol = state.labelled(style.SYMBOLS[field], field)
-    return _Map(values, field, plane, label, what + _where(plane), symbol, _axes(state))
+def drawn(state: State, plane: Plane, label: str, what: str, field: str | None = None) -> _Map:
+    """The map of `field`, by default the main field, on `plane`."""
+    field = field or main_field(state)
+    (values,), opacity = _images(state, [field], plane)
+    quantity = state.labelled(style.label(field), field)
+    return _Map(values, opacity, field, plane, label, what + _where(plane), quantity, _axes(state))
 
 
-def _side_by_side(drawn: Sequence[_Map]) -> Figure:
-    scale = style.scale(np.concatenate([one.values.ravel() for one in drawn]))
-    columns, width, height = _arrangement(drawn[0].plane, len(drawn), WIDEST)
-    rows = -(-len(drawn) // columns)
+def side_by_side(maps: Sequence[_Map], scale=None) -> Figure:
+    """Maps in rows, in one scale of colours, by default one that suits all values."""
+    scale = scale or style.scale(np.concatenate([one.values.ravel() for one in maps]))
+    columns, width, height = _arrangement(maps[0].plane, len(maps), WIDEST)
+    rows = -(-len(maps) // columns)
     figure = style.new_figure(columns * width + 1.2, rows * (height + 0.35) + 0.8, "compressed")
     panels = figure.subplots(rows, columns, squeeze=False)
-    for panel, one in zip(panels.flat, drawn, strict=False):
-        image = _show(panel, one.values, one.plane, one.field, scale)
+    for panel, one in zip(panels.flat, maps, strict=False):
+        image = _show(panel, one.values, one.opacity, one.plane, one.field, scale)
         panel.set_title(textwrap.fill(one.label, LONGEST_TITLE))
-    shown, empty = np.split(panels.ravel(), [len(drawn)])
+    shown, empty = np.split(panels.ravel(), [len(maps)])
     for panel in empty:
         panel.remove()
-    _label_axes(panels, len(drawn), drawn[0].axes)
+    differ = len({one.plane.extent for one in maps}) > 1
+    _label_axes(panels, len(maps), maps[0].axes, differ)
     bar = figure.colorbar(image, ax=list(shown), pad=0.015, aspect=30, extend=_extends(image))
-    bar.ax.set_title(", ".join(dict.fromkeys(one.symbol for one in drawn)))
-    figure.suptitle("; ".join(sorted({one.what for one in drawn})))
+    bar.set_label(", ".join(sorted({one.quantity for one in maps})))
+    figure.suptitle("; ".join(sorted({one.what for one in maps})))
     return figure
 
 
-def _images(state: State, names: Sequence[str], plane: Plane) -> np.ndarray:
+def _images(state: State, names, plane: Plane) -> tuple[np.ndarray, np.ndarray | None]:
+    """Maps of fields (F, ny, nx), and how opaque each pixel (ny, nx) is, None for fully.
+
+    Kernels of gas reach far into vacuum: there, colours fade from the sum of V W at a surface to
+    half of it. Solids and liquids end at their surface.
+    """
     values = np.stack([state.scalar(name) for name in names])
-    return _interpolated(state, values, plane)
+    means, cover = _interpolated(state, values, plane)
+    if state.has_surface:
+        return np.where(cover > AT_SURFACE, means, np.nan), None
+    if "open" not in state.problem.boundaries:
+        return means, None
+    # from the last particles outwards, until they would be seen no more
+    opacity = np.clip(2.0 * cover / AT_SURFACE - 1.0, 0.0, 1.0)
+    return np.where(opacity > 0.0, means, np.nan), opacity
 
 
-def _interpolated(state: State, values: np.ndarray, plane: Plane) -> np.ndarray:
-    least = AT_SURFACE if state.has_surface else 0.0
-    return onto_plane(values, state.particles, state.domain, state.kernel, plane, least)
+def _interpolated(state: State, values: np.ndarray, plane: Plane):
+    return with_cover(values, state.particles, state.domain, state.kernel, plane)
 
 
 def _outline(panel, state: State, plane: Plane) -> None:
@@ -140,19 +180,32 @@ def _outline(panel, state: State, plane: Plane) -> None:
     numbers = np.unique(body) if body is not None else np.zeros(0)
     if not 2 <= numbers.size <= MOST_OUTLINES:
         return
-    shares = _interpolated(state, np.stack([body == one for one in numbers]), plane)
+    shares, cover = _interpolated(state, np.stack([body == one for one in numbers]), plane)
+    shares = np.where(cover > AT_SURFACE, shares, 0.0)
     step = (plane.high - plane.low) / np.array(plane.shape)
     x, y = (plane.low[d] + step[d] * (np.arange(plane.shape[d]) + 0.5) for d in range(2))
-    for share in np.nan_to_num(shares):
+    for share in shares:
         panel.contour(x, y, share, levels=[0.5], colors="white", linewidths=0.7)
 
 
-def _show(panel, values, plane: Plane, name: str, scale):
+def _show(panel, values, opacity, plane: Plane, name: str, scale):
     panel.set_facecolor(style.VACUUM)
+    is_thin = _ratio(plane) != _drawn_ratio(plane)
     return panel.imshow(
         values, origin="lower", extent=plane.extent, cmap=style.MAPS[name], norm=scale,
-        aspect="equal",
+        alpha=opacity, aspect=_ratio(plane) / _drawn_ratio(plane) if is_thin else "equal",
     )  # fmt: skip
+
+
+def _ratio(plane: Plane) -> float:
+    """Of the sides, width over height."""
+    sides = plane.high - plane.low
+    return float(sides[0] / sides[1])
+
+
+def _drawn_ratio(plane: Plane) -> float:
+    """Of the sides on paper: labels of a longer, thinner map would collide."""
+    return float(np.clip(_ratio(plane), 1.0 / WIDEST_RATIO, WIDEST_RATIO))
 
 
 def _extends(image) -> str:
@@ -162,7 +215,7 @@ def _extends(image) -> str:
 
 def _arrangement(plane: Plane, count: int, widest: float) -> tuple[int, float, float]:
     """Columns, and inches of a map: wide maps above each other, others in rows of up to three."""
-    sides = plane.high - plane.low
+    sides = np.array([_drawn_ratio(plane), 1.0])
     columns = 1 if sides[0] > 2.0 * sides[1] else min(count, 3 if count not in (2, 4) else 2)
     longest = min(LONGEST_SIDE, widest / columns) if columns > 1 else 1.6 * LONGEST_SIDE
     width, height = longest * sides / sides.max()
@@ -173,17 +226,19 @@ def _axes(state: State) -> list[str]:
     return [state.labelled(label, "x") for label in ("$x$", "$y$")]
 
 
-def _label_axes(panels, count: int, labels: Sequence[str]) -> None:
-    """Numbers and names on the outer axes of the first `count` panels of a grid."""
+def _label_axes(panels, count: int, labels: Sequence[str], differ: bool = False) -> None:
+    """Numbers and names on the outer axes of the first `count` panels, on all where they differ."""
     columns = panels.shape[1]
     for i, panel in enumerate(panels.flat[:count]):
         is_lowest = i + columns >= count
-        panel.tick_params(labelbottom=is_lowest, labelleft=i % columns == 0)
+        is_first = i % columns == 0
+        panel.tick_params(labelbottom=is_lowest or differ, labelleft=is_first or differ)
         if is_lowest:
             panel.set_xlabel(labels[0])
-        if i % columns == 0:
+        if is_first:
             panel.set_ylabel(labels[1])
 
 
 def _where(plane: Plane) -> str:
-    return "" if plane.height is None else f", at $z$ = {plane.height:.4g}"
+    where = "" if plane.height is None else f", at $z$ = {plane.height:.4g}"
+    return where + (", not to scale" if _ratio(plane) != _drawn_ratio(plane) else "")

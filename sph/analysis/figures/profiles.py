@@ -1,84 +1,31 @@
-"""Profiles of density, velocity, pressure or stress, and energy, along x or the radius."""
+"""Profiles of the four fields that a problem names, along x or the radius."""
 
 import textwrap
-from collections.abc import Sequence
-from typing import NamedTuple
+from collections.abc import Iterable, Sequence
 
 import numpy as np
+from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 
-from sph.analysis import truth
 from sph.analysis.figures import style
+from sph.analysis.figures.profile import SMALL_SIGNAL, Profile, has_small_signal, profile
 from sph.analysis.figures.sources import State
 
-EXACT_POINTS = 2000
 LONGEST_TITLE = 90  # letters in a line
 MOST_BINS = 100
 # A vector file with more dots than this is slow to open, so they become pixels in it.
 MOST_VECTOR_DOTS = 2000
 
 
-class Profile(NamedTuple):
-    """One state as a function of one coordinate; velocities are the component along it."""
+def _without_exact(left_out: Sequence[str | None]) -> str:
+    """Lines for a title that say why an exact solution that the problem has is not drawn.
 
-    symbol: str  # of the coordinate: x or r
-    coordinate: np.ndarray  # (M,) of the particles in the region over which errors are taken
-    fields: dict[str, np.ndarray]  # (M,) each
-    exact_coordinate: np.ndarray
-    exact: dict[str, np.ndarray]  # empty where there is none
-    is_scattered: bool  # in 2 and 3-D, where many particles share a coordinate
-
-
-def profile(state: State) -> Profile:
-    """The particles of the problem's error region, and the exact solution there."""
-    particles, problem = state.particles, state.problem
-    inside, _ = problem.error_region(state.eos, state.time, particles.position)
-    if not inside.any():
-        inside[:] = True
-    position, velocity = particles.position[:, inside], particles.velocity[:, inside]
-    if state.is_radial:
-        offset = position - problem.centre[:, None]
-        coordinate = np.linalg.norm(offset, axis=0)
-        along = (velocity * offset).sum(axis=0) / np.where(coordinate > 0.0, coordinate, 1.0)
-    else:
-        coordinate, along = position[0], velocity[0]
-    scalars = {name: state.scalar(name)[inside] for name in problem.profiles if name != "velocity"}
-    end = coordinate.max()
-    # not at r = 0 itself, where an exact blast has no gas
-    start = end / EXACT_POINTS if state.is_radial else coordinate.min()
-    at = np.linspace(start, end, EXACT_POINTS)
-    return Profile(
-        "r" if state.is_radial else "x",
-        coordinate,
-        scalars | {"velocity": along},
-        at,
-        _exact_along(state, at),
-        is_scattered=state.dimension > 1,
-    )
-
-
-def _exact_along(state: State, at: np.ndarray) -> dict[str, np.ndarray]:
-    """On a line along x through the centre of the box, where `at` is x or the radius.
-
-    NaN where waves from the ends of the domain have come, and the solution does not hold.
+    left_out: one reason a state, None where the solution is drawn or the problem has none.
     """
-    if state.left_out:
-        return {}
-    position = np.repeat(state.problem.centre[:, None], at.size, axis=1)
-    position[0] = position[0] + at if state.is_radial else at
-    exact = state.exact(position) or {}
-    holds = truth.within(state.problem, state.eos, state.time, position)
-    fields = exact | {"velocity": exact["velocity"][0]}
-    return {name: np.where(holds, values, np.nan) for name, values in fields.items()}
-
-
-def _without_exact(states: Sequence[State]) -> str:
-    """Lines for a title that say why an exact solution that the problem has is not drawn."""
-    reasons = {state.left_out for state in states if state.may_have_exact and state.left_out}
-    which = "" if len(states) == 1 else "in part "
+    which = "" if len(left_out) == 1 else "in part "
     return "".join(
         "\n" + textwrap.fill(f"{which}without the exact solution: {reason}", LONGEST_TITLE)
-        for reason in sorted(reasons)[:1]
+        for reason in sorted({reason for reason in left_out if reason})[:1]
     )
 
 
@@ -86,7 +33,7 @@ def single(state: State) -> Figure:
     """One state: particles, exact solution, error of each field."""
     label = "SPH" if state.dimension == 1 else "SPH: median, 5 % to 95 %, and all particles in grey"
     title = f"{state.title}, {state.when}"
-    return _figure([state], [label], style.colours(1), title, note_errors=True)
+    return _of_runs([state], [label], title)
 
 
 def compared(states: Sequence[State], labels: Sequence[str]) -> Figure:
@@ -98,39 +45,64 @@ def compared(states: Sequence[State], labels: Sequence[str]) -> Figure:
         labels = [f"{label}, {state.when}" for label, state in zip(labels, states, strict=True)]
     else:
         title += times
-    return _figure(states, labels, style.colours(len(states)), ", ".join(title), note_errors=True)
+    return _of_runs(states, labels, ", ".join(title))
 
 
-def over_time(states: Sequence[State]) -> Figure:
-    """One run at several times, from dark to light."""
-    labels = [state.when for state in states]
-    colours = style.sequence(len(states))
-    return _figure(states, labels, colours, states[-1].title, note_errors=False)
+def over_time(states: Iterable[State]) -> Figure:
+    """One run at several times, from dark to light; read one by one, they need little memory."""
+    profiles, labels, left_out = [], [], []
+    for state in states:
+        profiles.append(profile(state))
+        labels.append(state.when)
+        left_out.append(state.left_out if state.may_have_exact else None)
+    return _figure(
+        profiles, labels, style.sequence(len(labels)), state.title + _without_exact(left_out),
+        state, [{}] * len(labels),
+    )  # fmt: skip
 
 
-def _figure(states, labels, colours, title, note_errors: bool) -> Figure:
+def _of_runs(states: Sequence[State], labels, title: str) -> Figure:
+    left_out = [state.left_out if state.may_have_exact else None for state in states]
+    return _figure(
+        [profile(state) for state in states], labels, style.colours(len(states)),
+        title + _without_exact(left_out), states[0], [state.errors() for state in states],
+    )  # fmt: skip
+
+
+def _figure(profiles: Sequence[Profile], labels, colours, title: str, state, errors) -> Figure:
+    """A panel for each of the problem's four fields; `errors` by field, one a profile.
+
+    state: one of those drawn, which has the problem and the units.
+    """
     figure = style.new_figure(7.2, 5.8)
-    names = states[0].problem.profiles
-    panels = dict(zip(names, figure.subplots(2, 2, sharex=True).flat, strict=True))
-    profiles, alone = [profile(state) for state in states], len(states) == 1
-    errors = [state.errors() if note_errors else {} for state in states]
+    panels = dict(zip(state.problem.profiles, figure.subplots(2, 2, sharex=True).flat, strict=True))
+    alone, exact = len(profiles) == 1, []
+    in_order = style.sequence(len(profiles)) == colours
     for name, panel in panels.items():
-        _set_scale(panel, profiles, name)
-        panel.set_ylabel(states[0].labelled(style.SYMBOLS[name], name))
+        shown, label = list(profiles), style.label(name)
+        if is_small := has_small_signal(profiles, name):
+            shown, label = (
+                [one.less_means(name) for one in profiles],
+                f"{style.SYMBOLS[name]} less its mean",
+            )
+        panel.set_ylabel(state.labelled(label, name))
+        _set_scale(panel, shown, name)
         drawn = [
             _particles(panel, one, name, colour, alone)
-            for one, colour in zip(profiles, colours, strict=True)
+            for one, colour in zip(shown, colours, strict=True)
         ]
-        exact = [_exact(panel, one, name, alone) for one in profiles if name in one.exact]
-        _note(panel, name, drawn, errors)
+        exact += [
+            _exact(panel, one, name, alone, _darker(colour) if in_order else style.EXACT)
+            for one, colour in zip(shown, colours, strict=True)
+            if name in one.exact
+        ]
+        _note(panel, name, drawn, errors, profiles if is_small else [])
     for panel in list(panels.values())[2:]:
         symbol = profiles[0].symbol
-        panel.set_xlabel(states[0].labelled(f"${symbol}$", symbol))
-    figure.suptitle(title + _without_exact(states))
-    entries = [
-        *zip(drawn, labels, strict=True),
-        *((line, states[0].problem.truth[1]) for line in exact[:1]),
-    ]
+        panel.set_xlabel(state.labelled(style.AXES[symbol], symbol))
+    figure.suptitle(title)
+    truth = state.problem.truth[1]
+    entries = [*zip(drawn, labels, strict=True), *((line, truth) for line in exact[:1])]
     figure.legend(
         *zip(*entries, strict=True), loc="outside lower center", markerscale=2.0,
         ncols=7 if max(map(len, labels)) < 15 else 2, columnspacing=1.4, handletextpad=0.4,
@@ -139,11 +111,11 @@ def _figure(states, labels, colours, title, note_errors: bool) -> Figure:
 
 
 def _set_scale(panel, profiles: Sequence[Profile], name: str) -> None:
-    """Limits; logarithmic where a peak would press all the rest to the floor."""
+    """Limits; logarithmic where a peak or a large step would press all the rest to the floor."""
     values = np.concatenate([one.fields[name] for one in profiles])
     exact = np.concatenate([one.exact.get(name, values[:0]) for one in profiles])
     panel.margins(x=0.02)
-    if values.min() > 0.0 and values.max() > 100.0 * np.median(values):
+    if values.min() > 0.0 and _spans_decades(values):
         # the exact blast is infinitely hot at its centre: the particles set the limits
         panel.set_yscale("log")
         panel.set_ylim(values.min() / 3.0, values.max() * 3.0)
@@ -153,6 +125,18 @@ def _set_scale(panel, profiles: Sequence[Profile], name: str) -> None:
     # what is uniform is shown as a line, not as its round-off
     margin = max(0.06 * (high - low), 1e-3 * max(abs(low), abs(high))) or 1.0
     panel.set_ylim(low - margin, high + margin)
+
+
+def _spans_decades(values: np.ndarray) -> bool:
+    """Whether there is a peak far above the median, or a step of three decades in the middle."""
+    largest = values.max()
+    is_high, is_low = values > 0.5 * largest, values < 1e-3 * largest
+    return largest > 100.0 * np.median(values) or min(is_high.mean(), is_low.mean()) > 0.4
+
+
+def _darker(colour) -> tuple[float, ...]:
+    """For a line over dots of that colour."""
+    return tuple(0.6 * part for part in to_rgb(colour))
 
 
 def _particles(panel, one: Profile, name: str, colour, alone: bool):
@@ -185,22 +169,26 @@ def _cloud(panel, coordinate, values) -> None:
     )  # fmt: skip
 
 
-def _exact(panel, one: Profile, name: str, alone: bool):
+def _exact(panel, one: Profile, name: str, alone: bool, colour):
     # over one run's particles, but under those of several, which would vanish behind the lines
     width, order = (0.9, 2.5) if alone else (0.6, 1.0)
     (line,) = panel.plot(
-        one.exact_coordinate, one.exact[name], "-", lw=width, color=style.EXACT, zorder=order
+        one.exact_coordinate, one.exact[name], "-", lw=width, color=colour, zorder=order
     )
     return line
 
 
-def _note(panel, name: str, drawn, errors) -> None:
-    """The error beside the mark of each state that has one."""
+def _note(panel, name: str, drawn, errors, off_mean: Sequence[Profile]) -> None:
+    """The error beside the mark of each state that has one; for `off_mean` that of the mean too."""
     noted = [
         (mark, rf"$L_1$ = {style.number(error[name])}")
         for mark, error in zip(drawn, errors, strict=True)
         if name in error
     ]
+    for k, one in enumerate(off_mean[: len(noted)]):
+        mean, exact = one.means(name)
+        if abs(off := mean / exact - 1.0) > SMALL_SIGNAL[0]:
+            noted[k] = noted[k][0], f"{noted[k][1]}\nmean {100.0 * off:+.2g} %"
     if noted:
         panel.legend(*zip(*noted, strict=True), loc="best", markerscale=2.0, handletextpad=0.4)
 

@@ -18,6 +18,9 @@ MARKERS = "osD^vP*X"
 FRONT = "0.75"
 GUIDE = "0.55"
 ORDERS = (1, 2)  # of the guide lines
+ABOVE = 1.6  # the guide lines above the nearest point, as a ratio of errors
+ROOM_FOR_GUIDES = 4.0  # the same of the frame above the largest error
+LABEL_AT = 0.3  # of a guide line's length
 MANY = 12  # lines of a legend beyond which its letters shrink
 MOST_COLUMNS = 3  # of panels
 WIDEST_WITHIN = 46  # letters of size 8 that a panel has room for
@@ -80,7 +83,7 @@ def _figure(report: Report, x, label: str, note: Callable[[Series], str], slopes
     if several:
         _room_for_legends(panels, max(map(len, sweeps.values())))
     for panel in panels:
-        _guides(panel, x, slopes)
+        _guides(panel, x, report.error, slopes)
         _ticks(panel)
         last_row = panel.get_subplotspec().is_last_row()
         first_column = panel.get_subplotspec().is_first_col()
@@ -164,24 +167,24 @@ def _front(panel, report: Report) -> None:
     )  # fmt: skip
 
 
-def _guides(panel, x: np.ndarray, slopes: dict[int, float]) -> None:
-    """Dotted lines of those slopes down from the upper left corner, within what is drawn."""
+def _guides(panel, x: np.ndarray, error: np.ndarray, slopes: dict[int, float]) -> None:
+    """Dotted lines of those slopes above all that is drawn, so that they cross no curve."""
     if np.unique(x).size < 2:
         return
     (left, right), (bottom, top) = panel.get_xlim(), panel.get_ylim()
+    top = max(top, ROOM_FOR_GUIDES * error.max())
     panel.set_xlim(left, right)
     panel.set_ylim(bottom, top)
     for p, slope in slopes.items():
-        end = min(right, left * (bottom / top) ** (1.0 / slope))
-        panel.plot(
-            [left, end], [top, top * (end / left) ** slope], ":", color=GUIDE, lw=1, zorder=0
-        )
-        # in the middle of its visible part, on the line
-        at = np.sqrt(left * end)
+        level = ABOVE * (error / x**slope).max()
+        start, end = max(x.min(), (top / level) ** (1.0 / slope)), x.max()
+        if start >= end:
+            continue
+        panel.plot([start, end], level * np.array([start, end]) ** slope, ":", color=GUIDE, lw=1)
+        at = start ** (1.0 - LABEL_AT) * end**LABEL_AT
         panel.annotate(
-            f"order {p}", (at, top * (at / left) ** slope), color=GUIDE, fontsize=9,
-            xytext=(3, 2), textcoords="offset points", zorder=2,
-            bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.7, "pad": 0.3},
+            f"order {p}", (at, level * at**slope), color=GUIDE, fontsize=9, xytext=(2, 2),
+            textcoords="offset points",
         )  # fmt: skip
 
 
@@ -195,7 +198,8 @@ def _room_for_legends(panels, most_lines: int) -> None:
 def _ticks(panel) -> None:
     """Ticks that can be read also within a decade."""
     for axis, (low, high) in ((panel.xaxis, panel.get_xlim()), (panel.yaxis, panel.get_ylim())):
-        axis.set_minor_locator(LogLocator(subs=(2.0, 5.0) if high < 200.0 * low else "auto"))
+        within = (1.5, 2.0, 3.0, 5.0, 7.0) if high < 10.0 * low else (2.0, 5.0)
+        axis.set_minor_locator(LogLocator(subs=within if high < 200.0 * low else "auto"))
         axis.set_minor_formatter(tick if high < 200.0 * low else NullFormatter())
         axis.set_major_formatter(tick)
 

@@ -36,6 +36,8 @@ def tick(value: float, _position=None) -> str:
 
 
 def power(line: Series) -> str:
+    if line.has_fixed_costs:
+        return "fixed costs dominate"
     return "" if line.exponent is None else rf"error $\propto$ cost$^{{{line.exponent:.2f}}}$"
 
 

@@ -41,20 +41,54 @@ class Source:
         """The last state. Raises FileError."""
         return State(checkpoint.read(self.checkpoints[-1]))
 
-    def over_time(self, most: int) -> Iterator["State"]:
-        """The first, the last and others evenly between them, at most `most`. Raises FileError.
+    def state(self, k: int) -> "State":
+        """The state of checkpoint `k`. Raises FileError."""
+        return State(checkpoint.read(self.checkpoints[k]))
 
-        They are read one by one, since a large run's do not fit into memory together. One of
-        another problem is an error too.
-        """
-        count = len(self.checkpoints)
-        chosen = np.unique(np.linspace(0, count - 1, min(count, most)).round().astype(int))
+    def nearest(self, time: float) -> int:
+        """The number of the checkpoint nearest to `time`. Raises FileError."""
+        return int(np.argmin(np.abs(self._times - time)))
+
+    @cached_property
+    def _times(self) -> np.ndarray:
+        return np.array([checkpoint.read(path).time for path in self.checkpoints])
+
+    def over_time(self, most: int) -> "States":
+        """The first, the last and others between them, at most `most`, as even as that allows."""
+        return States([self.checkpoints[i] for i in evenly(len(self.checkpoints), most)])
+
+
+@dataclass(frozen=True)
+class States:
+    """States of one run, read one by one: a large run's do not fit into memory together.
+
+    Iteration raises FileError, also for a checkpoint of another problem than the first.
+    """
+
+    paths: Sequence[Path]
+
+    def __iter__(self) -> Iterator["State"]:
         first = None
-        for i in chosen:
-            state = State(checkpoint.read(self.checkpoints[i]))
+        for path in self.paths:
+            state = State(checkpoint.read(path))
             first = first or state.problem
-            same_run.check_problem(self.checkpoints[i], state.problem, first)
+            same_run.check_problem(path, state.problem, first)
             yield state
+
+
+def evenly(count: int, most: int) -> list[int]:
+    """At most `most` of 0 … count - 1 with the first and the last, equally spaced if possible.
+
+    Otherwise equally spaced from the last backwards; only the first interval is shorter.
+    """
+    if count <= most:
+        return list(range(count))
+    last = count - 1
+    for intervals in range(most - 1, 2, -1):
+        if last % intervals == 0:
+            return list(range(0, count, last // intervals))
+    stride = -(-last // (most - 1))
+    return sorted({0, *range(last, -1, -stride)})
 
 
 def find_source(path: Path) -> Source:
@@ -148,7 +182,7 @@ class State:
 
     @property
     def name(self) -> str:
-        return self.problem.name.replace("_", " ")
+        return self.problem.title or self.problem.name.replace("_", " ")
 
     @property
     def when(self) -> str:
@@ -174,8 +208,10 @@ class State:
 
     def scalar(self, name: str) -> np.ndarray:
         """Return a quantity (N,): density, pressure, internal_energy, plastic_strain, speed |v|,
-        von_mises, or stress, which is -sigma_xx of a solid.
+        v_r and v_phi about the problem's centre, von_mises, or stress, -sigma_xx of a solid.
         """
+        if name in ("v_r", "v_phi"):
+            return self._about_centre(name)
         if name == "speed":
             return np.linalg.norm(self.particles.velocity, axis=0)
         if name == "von_mises":
@@ -206,6 +242,33 @@ class State:
             self.checkpoint.config, self.time, self.particles, self.checkpoint.pressure
         )
         return {name: norm["L1"] for name, norm in found["fields"].items()} if found else {}
+
+    @cached_property
+    def offset(self) -> np.ndarray:
+        """(D, N) offset of particles from the centre of the solution, which moves with `drift`."""
+        problem = self.problem
+        centre = problem.centre + problem.drift * self.time
+        offset = self.particles.position - centre[:, None]
+        for axis, boundary in enumerate(problem.boundaries):
+            if boundary == "periodic":
+                length = problem.box[axis, 1] - problem.box[axis, 0]
+                offset[axis] -= length * np.round(offset[axis] / length)
+        return offset
+
+    @cached_property
+    def radius(self) -> np.ndarray:
+        """(N,) distance of particles from the centre of the solution."""
+        return np.linalg.norm(self.offset, axis=0)
+
+    def _about_centre(self, name: str) -> np.ndarray:
+        """(N,) component of the velocity along the offset, or in 2-D anticlockwise across it."""
+        velocity = self.particles.velocity - self.problem.drift[:, None]
+        offset = self.offset
+        if name == "v_r":
+            along = (velocity * offset).sum(axis=0)
+        else:
+            along = offset[0] * velocity[1] - offset[1] * velocity[0]
+        return along / np.where(self.radius > 0.0, self.radius, 1.0)
 
     @property
     def is_radial(self) -> bool:

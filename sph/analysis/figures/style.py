@@ -20,6 +20,8 @@ DPI = 180
 SYMBOLS = {
     "density": r"$\rho$",
     "velocity": r"$v$",
+    "v_r": r"$v_r$",
+    "v_phi": r"$v_\phi$",
     "pressure": r"$P$",
     "internal_energy": r"$u$",
     "stress": r"$-\sigma_{xx}$",
@@ -27,11 +29,16 @@ SYMBOLS = {
     "plastic_strain": r"$\varepsilon_p$",
     "von_mises": r"$\sigma_{\mathrm{vM}}$",
 }
-TITLES = {"plastic_strain": "plastic strain", "von_mises": "von Mises stress"}
+TITLES = {
+    "v_r": "radial velocity", "v_phi": "rotation velocity", "plastic_strain": "plastic strain",
+    "von_mises": "von Mises stress", "internal_energy": "specific internal energy",
+    "stress": "axial stress",
+}  # fmt: skip
+AXES = {"x": "$x$", "r": "distance from the centre $r$"}
 # Perceptually uniform, one a field, so that a reader does not take one for another.
 MAPS = {
-    "density": "viridis", "pressure": "inferno", "speed": "cividis", "plastic_strain": "magma",
-    "von_mises": "plasma",
+    "density": "viridis", "pressure": "inferno", "internal_energy": "bone", "speed": "cividis",
+    "plastic_strain": "magma", "von_mises": "plasma",
 }  # fmt: skip
 VACUUM = "0.85"
 MOST_DECADES = 4
@@ -89,9 +96,9 @@ def labelled(label: str, unit: str, units) -> str:
 
 
 @contextmanager
-def paper():
-    """The settings of all pictures, within the block."""
-    with matplotlib.rc_context(SETTINGS):
+def paper(dpi: int | None = None):
+    """The settings of all pictures, within the block. dpi: of files, by default DPI."""
+    with matplotlib.rc_context(SETTINGS | ({"savefig.dpi": dpi} if dpi else {})):
         yield
 
 
@@ -130,17 +137,24 @@ def sequence(count: int) -> list:
 
 
 def scale(values) -> Normalize:
-    """For a map: logarithmic where positive values span three decades, and at most MOST_DECADES."""
+    """For a map: logarithmic where positive values span three decades, at most MOST_DECADES, or
+    where a peak of more than 10 times the median would press all the rest into one colour.
+    """
     finite = values[np.isfinite(values)]
     if finite.size == 0:
         return Normalize(0.0, 1.0)
     low, high = float(finite.min()), float(finite.max())
-    if low > 0.0 and high > 1000.0 * low:
+    if low > 0.0 and (high > 1000.0 * low or high > 10.0 * float(np.median(finite))):
         return LogNorm(max(low, high / 10.0**MOST_DECADES), high)
     if high - low <= 1e-6 * abs(high):  # uniform gas: do not magnify round-off
         margin = 0.1 * abs(high) or 1.0
         return Normalize(low - margin, high + margin)
     return Normalize(low, high)
+
+
+def label(name: str) -> str:
+    """Name and symbol of a field, for an axis."""
+    return f"{TITLES.get(name, name)} {SYMBOLS[name]}"
 
 
 def number(value: float) -> str:

@@ -20,6 +20,11 @@ COSTS = {
 }
 
 
+# The cost of a step is proportional to N, and steps become no fewer: a cost that grows more slowly
+# than this power of N is mostly that of starting a run, and times of short runs are noise.
+LEAST_GROWTH = 0.9
+
+
 class Question(NamedTuple):
     """What a report compares."""
 
@@ -43,6 +48,7 @@ class Series(NamedTuple):
     members: tuple[int, ...]  # indices into the report's compared rows
     order: float | None  # p of error ~ spacing^p, spacing ~ N^(-1/D)
     exponent: float | None  # of error ~ cost^exponent
+    has_fixed_costs: bool = False  # the cost grows more slowly than N: no exponent is given
 
 
 class Report(NamedTuple):
@@ -121,6 +127,10 @@ def _series(line: _Line, which, error, cost) -> Series:
     order = None
     if by_number is not None and len(dimensions) == 1:
         order = -by_number * dimensions.pop()
-    exponent = front.slope(cost[which], error[which])
+    growth = front.slope(number, cost[which])
+    has_fixed_costs = growth is not None and growth < LEAST_GROWTH
+    exponent = None if has_fixed_costs else front.slope(cost[which], error[which])
     members = tuple(which.tolist())
-    return Series(line.rows[0].sweep, line.label, line.group, members, order, exponent)
+    return Series(
+        line.rows[0].sweep, line.label, line.group, members, order, exponent, has_fixed_costs
+    )

@@ -37,6 +37,8 @@ def _costs(report: Report) -> str:
 
 def _order(line: Series) -> str:
     fall = f", so error ∝ cost^{line.exponent:.2f}" if line.exponent is not None else ""
+    if line.has_fixed_costs:
+        fall = "; fixed costs dominate these short runs, so no power of the cost is given"
     return f"{_name(line)}: order {line.order:.2f} in the particle spacing{fall}."
 
 

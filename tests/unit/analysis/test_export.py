@@ -126,6 +126,13 @@ def test_profile_of_round_problem_is_over_the_radius():
     assert found["velocity"].max() > 0.1
 
 
+def test_profile_of_rotating_gas_has_both_components_of_the_velocity():
+    found = tables.profile(state_of("gresho").checkpoint)
+    for name in ("velocity", "velocity_phi"):
+        assert np.abs(found[name] - found[f"{name}_exact"]).max() < 1e-14, name
+    assert found["velocity_phi"].max() > 0.9
+
+
 def text_table(path):
     with open(path, newline="") as file:
         return [*csv.reader(file)]

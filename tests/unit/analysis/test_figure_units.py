@@ -15,9 +15,17 @@ DENSITY = r"[$M_\odot\,\mathrm{kpc}^{-3}$]"
 
 def test_profile_has_units_on_both_axes():
     panels = profiles.single(state_of("shock_tube", *GALAXY)).axes
-    assert panels[0].get_ylabel() == rf"$\rho$ {DENSITY}"
-    assert panels[1].get_ylabel() == r"$v$ [$\mathrm{kpc}\,\mathrm{Myr}^{-1}$]"
+    assert panels[0].get_ylabel() == rf"density $\rho$ {DENSITY}"
+    assert panels[1].get_ylabel() == r"velocity $v$ [$\mathrm{kpc}\,\mathrm{Myr}^{-1}$]"
     assert panels[2].get_xlabel() == f"$x$ {LENGTH}"
+
+
+def test_profile_over_the_radius_has_units_of_both_velocities():
+    panels = profiles.single(state_of("gresho", *GALAXY)).axes
+    speed = r"[$\mathrm{kpc}\,\mathrm{Myr}^{-1}$]"
+    assert panels[1].get_ylabel() == rf"rotation velocity $v_\phi$ {speed}"
+    assert panels[2].get_ylabel() == f"radial velocity $v_r$ {speed}"
+    assert panels[2].get_xlabel() == f"distance from the centre $r$ {LENGTH}"
 
 
 def test_maps_have_units_of_fields_axes_and_time():
@@ -27,7 +35,7 @@ def test_maps_have_units_of_fields_axes_and_time():
     assert single.axes[0].get_ylabel() == f"$y$ {LENGTH}"
     assert single.get_suptitle().endswith("$t$ = 0.5 Myr")
     several = maps.over_time(states)
-    assert several.axes[-1].get_title() == rf"$\rho$ {DENSITY}"
+    assert several.axes[-1].get_ylabel() == rf"density $\rho$ {DENSITY}"
     assert several.axes[0].get_ylabel() == f"$y$ {LENGTH}"
 
 
@@ -37,11 +45,11 @@ def test_history_has_units_of_its_columns(tmp_path):
     made = config.from_text(run.config.read_text())
     panels = history.figure(read(run.history), "a run", None, made).axes
     energy = r"[$M_\odot\,\mathrm{kpc}^{2}\,\mathrm{Myr}^{-2}$]"
-    assert panels[0].get_ylabel() == f"$E$ {energy}"
+    assert panels[0].get_ylabel() == f"energy $E$ {energy}"
     assert panels[1].get_ylabel() == "energy drift"
-    assert panels[3].get_ylabel() == r"$\Delta t$ [$\mathrm{Myr}$]"
+    assert panels[3].get_ylabel() == r"time step $\Delta t$ [$\mathrm{Myr}$]"
     assert panels[4].get_ylabel() == r"mode amplitude [$\mathrm{kpc}\,\mathrm{Myr}^{-1}$]"
-    assert panels[4].get_xlabel() == r"$t$ [$\mathrm{Myr}$]"
+    assert panels[4].get_xlabel() == r"time $t$ [$\mathrm{Myr}$]"
 
 
 def test_figures_without_units_have_plain_axes(tmp_path):

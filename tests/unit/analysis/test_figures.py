@@ -4,14 +4,16 @@ import shutil
 
 import numpy as np
 import pytest
+from matplotlib.colors import LogNorm
 from matplotlib.image import imread
 from states import gas_state
 
 from sph import config, kernels, registry
 from sph.analysis import errors, figures
 from sph.analysis.figures import history, maps, profiles, style
-from sph.analysis.figures.sources import State, find_source, von_mises
-from sph.analysis.interpolate import onto_plane
+from sph.analysis.figures.sources import State, evenly, find_source, von_mises
+from sph.analysis.figures.view import View, figure, states_at
+from sph.analysis.interpolate import with_cover
 from sph.errors import ConfigError, FileError
 from sph.output import checkpoint
 from sph.output.history import History
@@ -52,13 +54,15 @@ def state_of(problem: str, *overrides: str, time: float | None = None) -> State:
         # a floor for the hollow middle of a blast
         particles.density[:] = np.maximum(exact["density"], 0.01)
         particles.velocity[:] = exact["velocity"]
-        particles.internal_energy[:] = np.minimum(exact["internal_energy"], 1e3)
+        particles.internal_energy[:] = np.minimum(exact.get("internal_energy", 0.0), 1e3)
     D = made.problem.dimension
     ratio = kernels.support_ratio(made.physics.kernel_model(), D)
-    particles.support[:] = (
-        ratio * made.physics.eta * (particles.mass / particles.density) ** (1 / D)
-    )
+    is_solid = made.physics.formulation == "continuum"
+    eta = made.physics.spacing_ratio if is_solid else made.physics.eta
+    particles.support[:] = ratio * eta * (particles.mass / particles.density) ** (1 / D)
     particles.declare(Scene(made).fields)  # others that the scene has are zero
+    if particles.get("initial_support") is not None:
+        particles.initial_support[:] = particles.support
     return drawable(particles, made, time)
 
 
@@ -172,6 +176,15 @@ def test_evolution_spans_first_to_last_checkpoint(tube):
     assert [state.time for state in source.over_time(6)] == [0.0, 0.1, 0.2]
     assert [state.time for state in source.over_time(2)] == [0.0, 0.2]
     assert source.last().time == 0.2
+
+
+@pytest.mark.parametrize(
+    ("count", "most", "expected"),
+    [(1, 6, [0]), (6, 6, [0, 1, 2, 3, 4, 5]), (7, 6, [0, 2, 4, 6]), (11, 6, [0, 2, 4, 6, 8, 10]),
+     (8, 6, [0, 1, 3, 5, 7])],
+)  # fmt: skip
+def test_evolution_is_evenly_spaced(count, most, expected):
+    assert evenly(count, most) == expected
 
 
 # --- errors -----------------------------------------------------------------------------------
@@ -298,7 +311,76 @@ def test_profile_other_problems_not_radial(time):
     assert not state_of("point_explosion", "problem.dimension=1", time=time).is_radial
     assert not state_of("shock_tube", "problem.dimension=2", time=time).is_radial
     assert not state_of("uniform", time=time).is_radial
+    assert state_of("gresho", time=time).is_radial
     assert not state_of("kelvin_helmholtz", time=time).is_radial
+
+
+@pytest.mark.parametrize(
+    ("problem", "keys"),
+    [("gresho", ["problem.velocity=[0.5, -1.0]"]), ("yee", ["problem.velocity=[-2.0, 1.0]"]),
+     ("keplerian_ring", [])],
+)  # fmt: skip
+def test_vortex_profile_is_rotation_about_centre_that_moves(problem, keys):
+    state = state_of(problem, *keys, time=0.75)
+    found = profiles.profile(state)
+    assert state.problem.profiles == ("density", "v_phi", "v_r", "pressure")
+    # round-off of differences of velocities and positions of order 1 to 10
+    assert found.fields["v_r"] == pytest.approx(0.0, abs=1e-12)
+    assert found.exact["v_r"] == pytest.approx(0.0, abs=1e-12)
+    for name in ("v_phi", "density", "pressure"):
+        # interpolation between 2000 points of the exact line, with kinks of the Gresho vortex
+        exact = np.interp(found.coordinate, found.exact_coordinate, found.exact[name])
+        assert found.fields[name] == pytest.approx(exact, rel=1e-3, abs=2e-3)
+    assert np.ptp(found.fields["v_phi"]) > 0.1
+
+
+def test_rotation_is_anticlockwise_and_less_drift():
+    state = state_of("gresho", "problem.velocity=[0.5, -1.0]", time=0.5)
+    position = state.particles.position
+    # the centre has moved to (0.25, -0.5), at the end of the periodic box
+    position[:, 0], position[:, 1] = [0.35, -0.5], [0.25, 0.4]
+    state.particles.velocity[:, :2] = [[1.5, 0.75], [1.0, -0.5]]
+    assert state.radius[:2] == pytest.approx([0.1, 0.1])
+    assert state.scalar("v_r")[:2] == pytest.approx([1.0, -0.5])
+    assert state.scalar("v_phi")[:2] == pytest.approx([2.0, 0.25])
+
+
+def test_small_wave_is_drawn_less_its_mean():
+    state = state_of("sound_wave")
+    state.particles.density[:] *= 1.0025  # 2500 times the amplitude
+    panel = profiles.single(state).axes[0]
+    particles, exact = lines(panel)
+    for values in (particles[1], exact[1]):
+        assert np.abs(values).max() == pytest.approx(1e-6, rel=0.01)
+    assert panel.get_ylim()[1] < 2e-6
+    assert "less its mean" in panel.get_ylabel()
+    assert "mean +0.25 %" in panel.get_legend().get_texts()[0].get_text()
+    loud = profiles.single(state_of("sound_wave", "problem.amplitude=0.05")).axes[0]
+    assert "mean" not in loud.get_ylabel()
+
+
+def test_step_of_six_decades_is_logarithmic():
+    state = state_of("contrast")
+    exact = state.exact(state.particles.position)
+    state.particles.density[:] = exact["density"]
+    state.particles.internal_energy[:] = exact["internal_energy"]
+    panels = profiles.single(state).axes
+    assert [panel.get_yscale() for panel in panels] == ["log", "linear", "linear", "log"]
+
+
+def test_evolution_of_round_problem_is_over_radius(tmp_path):
+    run = write_run(tmp_path / "run", [state_of("gresho", time=t) for t in (0.0, 0.5)])
+    source = find_source(run.path)
+    pictures = dict(figures._pictures(source, run))
+    assert pictures["evolution"].axes[0].get_shared_x_axes().joined(*pictures["evolution"].axes[:2])
+    assert pictures["evolution"].axes[2].get_xlabel() == "distance from the centre $r$"
+
+
+def test_exact_lines_of_evolution_have_colours_of_their_times():
+    picture = profiles.over_time([state_of("shock_tube", time=t) for t in (0.1, 0.2)])
+    first, second, *exact = picture.axes[0].get_lines()
+    for dots, line in zip((first, second), exact, strict=True):
+        assert line.get_color() == pytest.approx([0.6 * part for part in dots.get_color()[:3]])
 
 
 def test_bins_contain_percentiles():
@@ -334,7 +416,8 @@ def test_map_shows_interpolated_fields():
     plane = maps.plane_of(state, 48)
     speed = np.linalg.norm(state.particles.velocity, axis=0)
     values = np.stack([state.particles.density, speed])
-    expected = onto_plane(values, state.particles, state.domain, state.kernel, plane)
+    expected, cover = with_cover(values, state.particles, state.domain, state.kernel, plane)
+    assert cover.min() > 0.5
     shown = [panel.images[0] for panel in maps.single(state).axes if panel.images]
     for image, values in zip(shown, expected, strict=True):
         np.testing.assert_array_equal(np.ma.getdata(image.get_array()), values)
@@ -432,8 +515,98 @@ def test_map_open_domain_includes_gas_outside():
     state = state_of("uniform", 'problem.boundary=["open", "periodic"]')
     state.particles.position[0] += 0.5
     plane = maps.plane_of(state, 16)
-    assert plane.low[0] == 0.0
-    assert plane.high[0] > 1.4
+    margin = 0.5 * np.median(state.particles.support)
+    # particles at 0.5 + 1/40 ... 1.5 - 1/40
+    assert plane.low[0] == pytest.approx(0.525 - margin)
+    assert plane.high[0] == pytest.approx(1.475 + margin)
+    assert (plane.low[1], plane.high[1]) == (0.0, 1.0)
+
+
+def test_evolution_in_one_frame_of_all_times():
+    states = [state_of("expanding_ball", time=0.0) for _ in range(2)]
+    states[1].particles.position[0] *= 2.0
+    drawn = [panel.images[0].get_extent() for panel in maps.over_time(states).axes if panel.images]
+    assert drawn[0] == drawn[1]
+    own = [maps.plane_of(state, 16) for state in states]
+    assert own[1].high[0] > own[0].high[0]
+    assert drawn[0][1] == own[1].high[0]
+    assert drawn[0][3] == own[0].high[1]
+
+
+def test_maps_of_different_domains_each_have_numbers_on_axes():
+    states = [state_of("uniform", f"problem.domain=[0.0, {end}]") for end in (1.0, 2.0)]
+    right = maps.compared(states, ["a", "b"]).axes[1]
+    assert right.yaxis.get_tick_params()["labelleft"]
+    right = maps.compared([states[0], states[0]], ["a", "b"]).axes[1]
+    assert not right.yaxis.get_tick_params()["labelleft"]
+
+
+def test_map_fades_beyond_gas_in_open_domain_only():
+    state = state_of("keplerian_ring")
+    image = maps.single(state).axes[0].images[0]
+    opacity, (nx, ny) = image.get_alpha(), maps.plane_of(state, 48).shape
+    left, right, bottom, top = image.get_extent()
+    x, y = np.meshgrid(
+        left + (np.arange(nx) + 0.5) * (right - left) / nx,
+        bottom + (np.arange(ny) + 0.5) * (top - bottom) / ny,
+    )
+    radius = np.hypot(x, y)
+    # full in the ring of 0.5 to 1.5; gone at half a spacing of 0.125 beyond the kernels' middle
+    assert (opacity[(radius > 0.55) & (radius < 1.45)] == 1.0).all()
+    assert (opacity[(radius < 0.3) | (radius > 1.7)] == 0.0).all()
+    assert ((opacity > 0.0) & (opacity < 1.0)).any()
+    assert np.array_equal(np.ma.getmaskarray(image.get_array()), opacity == 0.0)
+    assert maps.single(state_of("uniform")).axes[0].images[0].get_alpha() is None
+
+
+def test_thin_domain_is_stretched_and_says_so():
+    picture = maps.single(state_of("uniform", "problem.domain=[[0.0, 100.0], [0.0, 1.0]]"))
+    assert "not to scale" in picture.get_suptitle()
+    assert picture.axes[0].get_aspect() == pytest.approx(100.0 / maps.WIDEST_RATIO)
+
+
+# --- options of maps ----------------------------------------------------------------------------
+
+
+def test_view_sets_field_scale_and_part(shear):
+    source = find_source(shear.path)
+    states = states_at(source, [0.4, 0.1, 0.45])
+    assert [state.time for state in states] == [0.0, 0.5]
+    view = View("pressure", (2.0, 3.0), True, (0.1, 0.4, -0.2, 0.0))
+    images = [panel.images[0] for panel in figure(states, view).axes if panel.images]
+    assert len(images) == 2
+    for image, state in zip(images, states, strict=True):
+        assert image.get_extent() == [0.1, 0.4, -0.2, 0.0]
+        assert isinstance(image.norm, LogNorm)
+        assert (image.norm.vmin, image.norm.vmax) == (2.0, 3.0)
+        pressure = state.scalar("pressure")
+        shown = np.ma.getdata(image.get_array())
+        assert pressure.min() <= shown.min() < shown.max() <= pressure.max()
+
+
+def test_views_draw_one_picture_each(shear, tube, tmp_path):
+    assert figures.draw([shear.path], view=View("speed")) == [shear.figures / "map_of_speed.png"]
+    assert figures.draw([tube.path], times=[0.1]) == [tube.figures / "profiles_at_times.png"]
+    sizes = []
+    for dpi in (40, 80):
+        (path,) = figures.draw([shear.path], tmp_path / "a.png", View("density"), dpi=dpi)
+        sizes.append(imread(path).shape[1])
+    assert sizes[1] == pytest.approx(2 * sizes[0], abs=4)
+
+
+@pytest.mark.parametrize(
+    "view",
+    [View("von_mises"), View(limits=(2.0, 1.0)), View(limits=(0.0, 1.0), is_log=True),
+     View(zoom=(0.0, 1.0, 1.0, 0.0))],
+)  # fmt: skip
+def test_view_that_cannot_be_drawn_is_refused(messages, shear, view):
+    with messages.raised(ConfigError):
+        figures.draw([shear.path], view=view)
+
+
+def test_map_of_line_is_refused(messages, tube):
+    with messages.raised(ConfigError):
+        figures.draw([tube.path], view=View("density"))
 
 
 # --- history ----------------------------------------------------------------------------------
@@ -449,8 +622,8 @@ def test_history_figure_shows_drift_limiter_and_diagnostics(shear):
     np.testing.assert_array_equal(lines(drift)[0], [found["t"], [0.0, 0.25]])
     assert [line[1].tolist() for line in lines(momentum)] == [[0.0, 1.0]] * 2
     assert [text.get_text() for text in steps.get_legend().get_texts()] == [
-        "signal speed",
-        "energy",
+        "by signal speed",
+        "by energy",
     ]
     assert [line[0].tolist() for line in lines(steps)] == [[0.0], [0.5]]
     assert mode.get_yscale() == "log"
@@ -459,6 +632,30 @@ def test_history_figure_shows_drift_limiter_and_diagnostics(shear):
     beside = {"mode_amplitude": np.array([0.1, 0.2])}
     *_, mode = history.figure(found, "a run", beside).axes
     np.testing.assert_array_equal(lines(mode)[1][1], beside["mode_amplitude"])
+
+
+def test_history_figure_leaves_out_zeros_and_round_off_of_momentum(shear):
+    found = read_history(shear.history)
+    found["mode_amplitude"] = np.zeros(2)
+    found["momentum_y"] = np.array([0.0, 1e-15])
+    found["momentum_x"] = np.array([3.0, 3.0])
+    picture = history.figure(found, "a run", mass=1.0)
+    assert [panel.get_ylabel().split(" $")[0] for panel in picture.axes] == [
+        "energy", "energy drift", "time step",
+    ]  # fmt: skip
+    assert r"within $1.00\times10^{-15}$" in picture.get_suptitle()
+    found["momentum_y"] = np.array([0.0, 1e-9])
+    picture = history.figure(found, "a run", mass=1.0)
+    assert len(picture.axes) == 4
+    assert "round-off" not in picture.get_suptitle()
+
+
+def test_history_legends_cover_no_data(shear):
+    picture = history.figure(read_history(shear.history), "a run")
+    picture.draw_without_rendering()
+    for panel in picture.axes:
+        if legend := panel.get_legend():
+            assert legend.get_window_extent().y0 >= panel.get_window_extent().y1 - 1.0
 
 
 def test_history_figure_shows_gravitational_energy_and_theory_of_energies(shear):
@@ -481,6 +678,11 @@ def test_colour_scale_covers_range_without_blowing_up_round_off():
     assert style.scale(np.array([1.0, np.nan, 3.0])).vmax == 3.0
     wide = style.scale(np.array([1e-9, 1.0]))
     assert wide.vmin == pytest.approx(10.0**-style.MOST_DECADES)
+    # a dense cloud of 1 % of the pixels beside a wind of density 1
+    cloud = np.concatenate([np.ones(99), [34.0]])
+    assert style.scale(cloud).vmin == 1.0
+    assert isinstance(style.scale(cloud), LogNorm)
+    assert not isinstance(style.scale(np.linspace(1.0, 34.0)), LogNorm)
     # round-off of uniform gas is not blown up to the whole range of colours
     uniform = style.scale(np.array([1.0, 1.0 + 1e-12]))
     assert uniform.vmax - uniform.vmin > 0.1

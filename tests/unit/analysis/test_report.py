@@ -183,6 +183,20 @@ def test_order_2d_is_in_particle_spacing(tmp_path):
     assert line.order == pytest.approx(2.0, rel=ROUND_OFF)
 
 
+def test_cost_that_grows_more_slowly_than_n_gives_no_exponent(tmp_path):
+    from sph.analysis.figures.report_labels import power
+
+    for n, cost in ((100, 0.2), (200, 0.25), (400, 0.3)):
+        write_run(tmp_path / "s" / str(n), 100 / n, cost, [f"problem.n={n}"])
+    report = compared(tmp_path / "s")
+    (line,) = report.series
+    assert line.exponent is None
+    assert line.order == pytest.approx(1.0, rel=ROUND_OFF)
+    assert power(line) == "fixed costs dominate"
+    assert "fixed costs dominate these short runs" in said(report)
+    assert "error ∝" not in said(report)
+
+
 def test_words_state_orders_front_and_excess(study):
     text = said(compared(study))
     assert "L1 error of density, plotted against CPU time without compilation" in text
@@ -527,6 +541,11 @@ def test_pictures_show_every_run(study):
     guides = [line for line in panel.lines if line.get_linestyle() == ":"]
     slopes = [front.slope(*map(np.asarray, line.get_data())) for line in guides]
     assert slopes == pytest.approx([-0.5, -1.0], rel=ROUND_OFF)
+    for (start, end), (top, bottom) in (line.get_data() for line in guides):
+        level = np.interp(np.log(report.cost), np.log([start, end]), np.log([top, bottom]))
+        inside = (report.cost >= start) & (report.cost <= end)
+        assert inside.any()
+        assert (level > np.log(report.error))[inside].all()  # no line crosses a curve
     panel = pictures.error_against_number(report).axes[0]
     assert any(line.get_label() == r"$\alpha$ = 1.0: order 1.00" for line in panel.lines)
     bars = pictures.phases(report).axes[0].containers

@@ -1,0 +1,135 @@
+"""Movies of runs: one frame for each checkpoint, all of one size and one scale of colours."""
+
+import functools
+import importlib
+import itertools
+import tempfile
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import BinaryIO
+
+import numpy as np
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.colors import Normalize
+from PIL import Image
+
+from sph.analysis.figures import maps, style
+from sph.analysis.figures.sources import Source, States, find_source
+from sph.analysis.figures.view import View
+from sph.analysis.interpolate import Plane
+from sph.errors import ConfigError, FileError
+from sph.output.files import explained, refuse_link, replacing
+
+FORMATS = (".gif", ".mp4")
+COLOURS = 256  # of a gif
+
+
+def make(
+    source: Path, target: Path | None, view: View, per_second: int = 10, dpi: int | None = None
+) -> Path:
+    """Write a movie of the run `source`; returns its path, by default figures/movie.gif.
+
+    Checkpoints are read three times, one at a time: for the part of the domain that all share, for
+    the scale of colours, and for the frames. per_second: frames. dpi: by default style.DPI.
+    Raises ConfigError for other suffixes than FORMATS, for .mp4 without imageio-ffmpeg and for
+    views that cannot be drawn, FileError for what is missing, damaged or cannot be written.
+    """
+    write = _writer(Path(target)) if target else _write_gif
+    found = find_source(Path(source))
+    if not found.is_run or len(found.checkpoints) < 2:
+        raise FileError(
+            f"{source}: a movie needs a run directory with two checkpoints or more.\n"
+            "Try: a run with a smaller output.interval."
+        )
+    states = States(found.checkpoints)
+    with style.paper():
+        view.check(found.last())
+        plane = view.plane(states, maps.PIXELS)
+        scale = _scale(states, view, plane)
+        path = Path(target) if target else _in_figures(found)
+        with replacing(path) as unfinished:
+            write(_frames(states, view, plane, scale, dpi or style.DPI), unfinished, per_second)
+    return path
+
+
+def _scale(states: States, view: View, plane: Plane) -> Normalize:
+    """One scale for all frames, from the lowest to the highest value of all."""
+    if view.limits:
+        return view.scale(*view.limits)
+    ends, middle = [], []
+    for state in states:
+        values = maps.drawn(state, plane, "", "", view.field).values
+        ends += [np.nanmin(values), np.nanmax(values)]
+        middle.append(np.nanmedian(values))
+    if view.is_log:
+        return view.scale(min(ends), max(ends))
+    return style.scale(np.array([*ends, *np.repeat(middle, 2)]))
+
+
+def _frames(states: States, view: View, plane: Plane, scale, dpi: int) -> Iterator[np.ndarray]:
+    """(height, width, 3) bytes of each frame; sides are even, as codecs of video ask."""
+    for state in states:
+        one = maps.drawn(state, plane, state.when, state.title, view.field)
+        picture = maps.side_by_side([one], scale)
+        picture.set_dpi(dpi)
+        canvas = FigureCanvasAgg(picture)
+        canvas.draw()
+        pixels = np.asarray(canvas.buffer_rgba())[..., :3]
+        height, width = (side - side % 2 for side in pixels.shape[:2])
+        yield np.ascontiguousarray(pixels[:height, :width])
+
+
+def _writer(target: Path) -> Callable:
+    """What writes a file of that suffix. Raises ConfigError."""
+    suffix = target.suffix.lower()
+    if suffix not in FORMATS:
+        raise ConfigError(
+            f"{target} names no format that a movie can have.\n"
+            f"Try: a name that ends in {' or '.join(FORMATS)}."
+        )
+    if suffix == ".gif":
+        return _write_gif
+    try:
+        ffmpeg = importlib.import_module("imageio_ffmpeg")
+    except ImportError:
+        raise ConfigError(
+            f"{target}: movies in .mp4 need the package imageio-ffmpeg, which is not installed.\n"
+            'Try: pip install "sph[movie]", or a name that ends in .gif.'
+        ) from None
+    return functools.partial(_write_mp4, ffmpeg)
+
+
+def _write_gif(frames: Iterator[np.ndarray], file: BinaryIO, per_second: int) -> None:
+    """One palette for all frames, of the first and the last, so that no colour flickers."""
+    images = [Image.fromarray(pixels) for pixels in frames]
+    both = Image.new("RGB", (images[0].width, 2 * images[0].height))
+    both.paste(images[0], (0, 0))
+    both.paste(images[-1], (0, images[0].height))
+    palette = both.quantize(COLOURS)
+    first, *others = (one.quantize(palette=palette, dither=Image.Dither.NONE) for one in images)
+    first.save(
+        file, format="gif", save_all=True, append_images=others, loop=0, optimize=False,
+        duration=round(1000 / per_second),
+    )  # fmt: skip
+
+
+def _write_mp4(ffmpeg, frames: Iterator[np.ndarray], file: BinaryIO, per_second: int) -> None:
+    """The encoder writes files only: to one of its own, which is copied."""
+    first = next(frames)
+    height, width = first.shape[:2]
+    with tempfile.TemporaryDirectory() as directory:
+        path = Path(directory) / "movie.mp4"
+        writer = ffmpeg.write_frames(str(path), (width, height), fps=per_second, macro_block_size=2)
+        writer.send(None)
+        for pixels in itertools.chain([first], frames):
+            writer.send(pixels)
+        writer.close()
+        file.write(path.read_bytes())
+
+
+def _in_figures(source: Source) -> Path:
+    assert source.run is not None
+    refuse_link(source.run.figures)
+    with explained(f"cannot write {source.run.figures}"):
+        source.run.figures.mkdir(exist_ok=True)
+    return source.run.figures / "movie.gif"

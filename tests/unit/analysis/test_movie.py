@@ -1,0 +1,86 @@
+"""Movies: frames of one size and one scale of colours, in order, and clear refusals."""
+
+import sys
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+from PIL import Image, ImageSequence
+from test_figures import low_resolution, state_of, tube, write_run  # noqa: F401 - fixtures
+
+from sph.analysis.figures import movie
+from sph.analysis.figures.sources import find_source
+from sph.analysis.figures.view import View
+from sph.cli import main
+from sph.errors import ConfigError, FileError
+
+
+@pytest.fixture
+def growing(tmp_path):
+    """Three checkpoints; the second is twice as dense."""
+    states = [state_of("kelvin_helmholtz", time=t) for t in (0.0, 0.1, 0.2)]
+    states[1].particles.density[:] *= 2.0
+    return write_run(tmp_path / "shear", states)
+
+
+def test_gif_has_frame_of_same_size_for_each_checkpoint(growing):
+    path = movie.make(growing.path, None, View(), per_second=5, dpi=40)
+    assert path == growing.figures / "movie.gif"
+    with Image.open(path) as image:
+        frames = [frame.convert("RGB") for frame in ImageSequence.Iterator(image)]
+        assert image.info["duration"] == 200
+    assert len(frames) == 3
+    assert len({frame.size for frame in frames}) == 1
+    assert all(side % 2 == 0 for side in frames[0].size)
+    first, second, third = (np.asarray(frame, dtype=float) for frame in frames)
+    # first and third show one state: they differ by the time in the title alone
+    middle = slice(first.shape[0] // 3, None)
+    assert np.abs(first - third)[middle].max() == 0.0
+    assert np.abs(first - second)[middle].max() > 50.0
+
+
+def test_movie_has_one_scale_of_all_frames(growing):
+    states = find_source(growing.path).over_time(9)
+    plane = View().plane(states, 32)
+    scale = movie._scale(states, View(), plane)
+    values = [movie.maps.drawn(state, plane, "", "").values for state in states]
+    assert (scale.vmin, scale.vmax) == (np.min(values), np.max(values))
+    assert np.max(values[0]) < scale.vmax
+    fixed = movie._scale(states, View(limits=(1.0, 2.0)), plane)
+    assert (fixed.vmin, fixed.vmax) == (1.0, 2.0)
+
+
+def test_mp4_without_encoder_is_refused(messages, growing, tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, "imageio_ffmpeg", None)
+    with messages.raised(ConfigError):
+        movie.make(growing.path, tmp_path / "a.mp4", View())
+
+
+def test_mp4_has_all_frames(growing, tmp_path):
+    ffmpeg = pytest.importorskip("imageio_ffmpeg")
+    path = movie.make(growing.path, tmp_path / "a.mp4", View(), dpi=40)
+    assert ffmpeg.count_frames_and_secs(str(path))[0] == 3
+
+
+def test_movie_of_unknown_suffix_is_refused(messages, growing, tmp_path):
+    with messages.raised(ConfigError):
+        movie.make(growing.path, tmp_path / "a.avi", View())
+
+
+def test_movie_of_line_or_checkpoint_is_refused(messages, growing, tube):  # noqa: F811
+    with messages.raised(ConfigError):
+        movie.make(tube.path, None, View())
+    with messages.raised(FileError):
+        movie.make(growing.checkpoint_path(1), None, View())
+
+
+def test_commands_pass_their_options_on(growing, tmp_path):
+    options = ["--field", "speed", "--range", "0.1", "0.2", "--zoom", "0", "0.2", "0", "0.1"]
+    runner = CliRunner()
+    done = runner.invoke(main, ["plot", str(growing.path), *options, "--time", "0", "--time", "1"])
+    assert done.output == f"drew {growing.figures / 'map_of_speed.png'}\n"
+    target = str(tmp_path / "a.gif")
+    done = runner.invoke(main, ["movie", str(growing.path), *options, "-o", target, "--fps", "20"])
+    assert done.output == f"drew {target}\n"
+    with Image.open(target) as image:
+        assert (image.n_frames, image.info["duration"]) == (3, 50)
