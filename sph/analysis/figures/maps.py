@@ -55,13 +55,14 @@ def compared(states: Iterable[State], labels: Sequence[str]) -> Figure:
 
 
 def main_field(state: State) -> str:
-    """Density; plastic strain or, without yielding, von Mises stress of a solid.
+    """Density; plastic strain of a solid or, if nothing has yielded, its von Mises stress.
 
     The density of a solid changes little.
     """
     if not state.is_solid:
         return "density"
-    return "von_mises" if state.particles.get("plastic_strain") is None else "plastic_strain"
+    strain = state.particles.get("plastic_strain")
+    return "von_mises" if strain is None or not strain.any() else "plastic_strain"
 
 
 def second_field(state: State) -> str:
@@ -98,14 +99,28 @@ class _Map(NamedTuple):
     axes: list[str]  # their labels
 
 
-def _drawn(state: State, label: str, what: str) -> _Map:
-    plane, field = plane_of(state, PIXELS_OF_MANY), main_field(state)
-    (values,) = _images(state, [field], plane)
-    symbol = state.labelled(style.SYMBOLS[field], field)
-    return _Map(values, field, plane, label, what + _where(plane), symbol, _axes(state))
+def _drawn(state: State, label: str, what: str) -> tuple[_Map, ...]:
+    """The map of the main field; before that of stress, which `_chosen` takes without yielding."""
+    plane, fields = plane_of(state, PIXELS_OF_MANY), [main_field(state)]
+    if state.is_solid and state.particles.get("plastic_strain") is not None:
+        fields = ["plastic_strain", "von_mises"]
+    return tuple(
+        _Map(
+            values, field, plane, label, what + _where(plane),
+            state.labelled(style.SYMBOLS[field], field), _axes(state),
+        )
+        for field, values in zip(fields, _images(state, fields, plane), strict=True)
+    )  # fmt: skip
 
 
-def _side_by_side(drawn: Sequence[_Map]) -> Figure:
+def _chosen(drawn: Sequence[tuple[_Map, ...]]) -> list[_Map]:
+    """The first map of each, or the last if the first shows nothing above 0 in any."""
+    place = 0 if any(np.any(one[0].values > 0.0) for one in drawn) else -1
+    return [one[place] for one in drawn]
+
+
+def _side_by_side(states: Sequence[tuple[_Map, ...]]) -> Figure:
+    drawn = _chosen(states)
     scale = style.scale(np.concatenate([one.values.ravel() for one in drawn]))
     columns, width, height = _arrangement(drawn[0].plane, len(drawn), WIDEST)
     rows = -(-len(drawn) // columns)

@@ -347,7 +347,7 @@ def test_map_shows_pressure_only_where_it_varies():
     assert maps.second_field(state_of("kelvin_helmholtz")) == "speed"
 
 
-def solid_state(yields=True) -> State:
+def solid_state(yields=True, strain=0.1) -> State:
     """A disc of two halves of material 0 and 1 that almost touch, under known stress."""
     strength = 'name = "elastic_plastic", shear_modulus = 1.0, yield_stress = 1.0'
     if not yields:
@@ -372,16 +372,30 @@ def solid_state(yields=True) -> State:
     particles.support[:] = 2.4 * np.sqrt(particles.mass)
     particles.deviatoric_stress[0, 0] = 0.3
     particles.deviatoric_stress[1, 1] = -0.1
+    if yields:
+        particles.plastic_strain[:] = strain
     return drawable(particles, made, 1.0)
 
 
 @pytest.mark.parametrize(
-    ("yields", "fields"), [(True, ["plastic strain", "von Mises"]), (False, ["von Mises", "press"])]
+    ("yields", "strain", "fields"),
+    [
+        (True, 0.1, ["plastic strain", "von Mises"]),
+        (True, 0.0, ["von Mises", "press"]),
+        (False, 0.0, ["von Mises", "press"]),
+    ],
 )
-def test_map_of_solid_shows_strain_or_stress(yields, fields):
-    panels = maps.single(solid_state(yields)).axes[:2]
+def test_map_of_solid_shows_strain_or_stress(yields, strain, fields):
+    panels = maps.single(solid_state(yields, strain)).axes[:2]
     for panel, field in zip(panels, fields, strict=True):
         assert panel.get_title().startswith(field)
+
+
+@pytest.mark.parametrize(("last", "symbol"), [(0.1, "varepsilon"), (0.0, "vM")])
+def test_maps_of_solid_over_time_show_one_field(last, symbol):
+    states = [solid_state(strain=strain) for strain in (0.0, last)]
+    *_, bar = maps.over_time(states).axes
+    assert symbol in bar.get_title()
 
 
 def test_map_of_solid_ends_at_its_surface_and_outlines_bodies():
