@@ -102,7 +102,7 @@ class Physics(Section):
     @model_validator(mode="before")
     @classmethod
     def _gamma_gives_way(cls, data: Any) -> Any:
-        if isinstance(data, dict) and data.get("eos") is not None:
+        if isinstance(data, dict) and (data.get("eos") or data.get("materials")):
             return {"gamma": None} | data
         return data
 

@@ -330,6 +330,8 @@ def test_wrong_initial_state_is_refused(home, name):
         ("diagnostics", '{"a": particles.mass}', "diagnostics returned a = a ndarray; expected a"),
         ("diagnostics", "particles.masses", "in diagnostics: AttributeError: "),
         ("exact", '{"density": 1.0}', "expected a dictionary of density, velocity, pressure, "),
+        ("exact", '{"density": 1.0}', "a dictionary without velocity, pressure, internal_energy;"),
+        ("exact", "1.0", "exact returned 1.0; expected a dictionary"),
         ("report", "1.0", "report returned 1.0; expected a dictionary"),
     ],
 )
@@ -342,6 +344,17 @@ def test_wrong_result_of_method_is_refused(home, method, value, words):
     assert done.exit_code == 2, done.output
     assert words in done.stderr
     assert "Traceback" not in done.stderr
+
+
+def test_wrong_exact_solution_is_refused_before_the_first_step(home):
+    (home / "clouds.py").write_text(
+        f"{CLOUDS}\n    def exact(self, position, time, eos):\n        return eos.density\n"
+    )
+    done = sph_("run", home / "clouds.toml", "-o", home / "run")
+    assert done.exit_code == 2, done.output
+    assert "in exact: AttributeError" in done.stderr
+    assert "checkpoint_000000" not in done.stderr
+    assert not list(home.glob("run/checkpoints/*"))
 
 
 # --- problems of other packages ---------------------------------------------------------------

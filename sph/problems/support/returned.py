@@ -61,8 +61,11 @@ def fault_of_arrays(arrays: dict, shapes: dict[str, str], dimension: int, number
 def _fault_of_exact(problem, found: Any, eos, time: float, position: np.ndarray) -> str:
     if found is None:
         return ""
-    if not isinstance(found, dict) or not EXACT.keys() <= found.keys():
-        return f"{_words(found)}; expected a dictionary of {', '.join(EXACT)}"
+    missing = EXACT.keys() - found.keys() if isinstance(found, dict) else ()
+    if missing or not isinstance(found, dict):
+        without = ", ".join(name for name in EXACT if name in missing)
+        words = f"a dictionary without {without}" if without else _words(found)
+        return f"{words}; expected a dictionary of {', '.join(EXACT)}"
     arrays = {name: np.nan_to_num(np.asarray(found[name])) for name in EXACT}  # NaN: not known
     return fault_of_arrays(arrays, EXACT, problem.dimension, np.shape(position)[-1])
 
