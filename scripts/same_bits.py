@@ -26,7 +26,7 @@ STEPS = 300
 
 # Sizes at which every scene takes seconds.
 SMALL = {
-    "billows": ["problem.n=4096"],
+    "kelvin_helmholtz_smooth_billows": ["problem.n=4096"],
     "blob": ["problem.n=2500"],
     "bodies": ["problem.n=600"],
     "contrast_graded": ["problem.n=2000"],

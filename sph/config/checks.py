@@ -85,7 +85,7 @@ def pairing_issues(found: dict[str, Section]) -> list[Issue]:
         return []
     physics, dimension = found["physics"], found["problem"].dimension
     # the limits of kernels were measured for gas; for other matter the summary reports pairs
-    if "eta" not in type(physics).model_fields or physics.allow_pairing:
+    if "allow_pairing" not in type(physics).model_fields or physics.allow_pairing:
         return []
     limit = physics.kernel_model().pairs_above.get(dimension, math.inf)
     if physics.eta <= limit:

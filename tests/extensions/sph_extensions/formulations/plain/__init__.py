@@ -199,7 +199,11 @@ def _gradient(kernel, dim, r, H_inv):
 class Plain(Formulation):
     """Density by summation, supports of fixed size, and the classical pair force."""
 
-    keys = (Key("plain_alpha", "artificial viscosity", kind=float, default=1.0, at_least=0.0),)
+    keys = (
+        Key("eta", "smoothing length in particle spacings", kind=float, default=1.6, above=0.0),
+        Key("plain_alpha", "artificial viscosity", kind=float, default=1.0, at_least=0.0),
+    )
+    neighbours_key = "physics.eta"
     evolved = (Evolved("internal_energy", "energy_rate", "predicted_energy", POSITIVE),)
 
     def __init__(self, scene):
