@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from sph import config
-from sph.analysis import truth
 from sph.errors import ConfigError
 from sph.problems.support import bodies
 
@@ -290,19 +289,6 @@ MATERIALS = f"[physics.materials.steel]\n{METAL}\n[physics.materials.water]\n{ST
 def test_material_that_does_not_fit_is_refused(messages, tmp_path, first, physics, key):
     with messages.raised(ConfigError, key):
         loaded(tmp_path, scene(f"{DISC}\n{first}", physics=physics))
-
-
-def test_materials_replace_gamma(tmp_path):
-    found = loaded(tmp_path, scene(DISC + '\nmaterial = "steel"', physics=MATERIALS))
-    assert found.physics.gamma is None
-    assert config.from_text(found.to_toml()) == found
-
-
-def test_bodies_in_a_field_have_no_exact_solution(tmp_path):
-    field = 'external = { name = "uniform", g = [0.0, -1.0] }'
-    found = loaded(tmp_path, scene(DISC, physics=f"[physics]\n{field}\n{METAL}"))
-    reason = truth.left_out(found, 0.0, np.zeros((2, 1)))
-    assert reason == "this problem has no exact solution"
 
 
 def test_initial_state_has_each_bodys_matter(tmp_path):
