@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 
 from sph import declarations, parts, registry, simd
-from sph.analysis import truth
 from sph.config import Config
 from sph.config.toml_text import value_text
 from sph.domain import Domain
@@ -169,7 +168,6 @@ class Scene:
         try:
             with np.errstate(all="ignore"):
                 found = problem.initial(self.eos)
-                truth.rehearse(self.config, found.position)
                 return self._with_density(found) if self.evolves("density") else found
         except (ArithmeticError, ValueError) as error:
             raise ConfigError(

@@ -6,7 +6,6 @@ All comparisons with exact solutions, and all figures of them, use these functio
 import numpy as np
 
 from sph.config import Config
-from sph.config.outside import Outside
 
 
 def departure(config: Config, time: float) -> str | None:
@@ -20,22 +19,13 @@ def departure(config: Config, time: float) -> str | None:
 
 def left_out(config: Config, time: float, position: np.ndarray) -> str | None:
     """Why errors against the exact solution cannot be taken at (D, N) particles, or None."""
-    problem, eos = config.problem, config.physics.eos_model()
     if reason := departure(config, time):
         return reason
+    problem, eos = config.problem, config.physics.eos_model()
     if problem.exact(eos, time, position[:, :1]) is None:
         return "this problem has no exact solution"
     inside, words = region(problem, eos, time, position)
     return None if inside.any() else f"no particle is in the region where errors are taken, {words}"
-
-
-def rehearse(config: Config, position: np.ndarray) -> None:
-    """Call `exact` of a problem from outside as the end of the run will, to find faults before.
-
-    Raises DeclarationError.
-    """
-    if isinstance(config.problem, Outside):
-        left_out(config, config.time.end, position)
 
 
 def region(problem, eos, time: float, position: np.ndarray) -> tuple[np.ndarray, str]:

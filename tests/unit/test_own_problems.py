@@ -346,17 +346,6 @@ def test_wrong_result_of_method_is_refused(home, method, value, words):
     assert "Traceback" not in done.stderr
 
 
-def test_wrong_exact_solution_is_refused_before_the_first_step(home):
-    (home / "clouds.py").write_text(
-        f"{CLOUDS}\n    def exact(self, position, time, eos):\n        return eos.density\n"
-    )
-    done = sph_("run", home / "clouds.toml", "-o", home / "run")
-    assert done.exit_code == 2, done.output
-    assert "in exact: AttributeError" in done.stderr
-    assert "checkpoint_000000" not in done.stderr
-    assert not list(home.glob("run/checkpoints/*"))
-
-
 # --- problems of other packages ---------------------------------------------------------------
 
 
