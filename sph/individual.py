@@ -105,6 +105,7 @@ class Individual:
         s.make_passes()
         with s.clock.phase("predict, correct"):
             s.energy_injected += leapfrog.correct_each(p, s.evolved, p.own_step, s.team)
+        s.make_last_passes()
         self._choose(tick)
         self._begin_steps(now, tick)
         return now

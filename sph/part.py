@@ -78,7 +78,7 @@ STAGES = ("prediction", "density", "gradients", "rates", "additions", "constrain
 
 
 class Pass(NamedTuple):
-    """A computation over all particles between prediction and correction.
+    """A computation over all particles between prediction and correction, or after it (`stage`).
 
     `reads`, `updates` and `writes` name fields, or None in place of a field that the scene lacks.
     The arrays of these fields, in this order, are arguments of `function`, None for None:

@@ -194,13 +194,17 @@ class Simulation:
         self.make_passes()
         with self.clock.phase("predict, correct"):
             self.energy_injected += leapfrog.correct(p, self.evolved, dt, self.team)
-        for one in self.scene.last_passes:
-            self._make(one)
+        self.make_last_passes()
         self.end_step(dt, end, step_size.Past(dt, allowed))
 
     def make_passes(self) -> None:
-        """Run the passes of a step, with the lists that they need."""
+        """Run the passes before the correction, with the lists that they need."""
         for one in self.scene.rate_passes:
+            self._make(one)
+
+    def make_last_passes(self) -> None:
+        """Run the passes after the correction."""
+        for one in self.scene.last_passes:
             self._make(one)
 
     def split(self, dt: float) -> None:
