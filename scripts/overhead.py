@@ -131,6 +131,8 @@ def timed(owner, function: str, name: str, spent: dict) -> None:
 class Progress:
     """Shows nothing; looks at the clocks after the first step and after each checkpoint."""
 
+    each_step = False
+
     def __init__(self, spent):
         self.spent, self.first, self.last = spent, None, None
 

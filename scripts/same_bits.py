@@ -161,6 +161,8 @@ class Enough(Exception):
 class Follow:
     """Progress of a run that keeps what the last step left, and ends or interrupts the run."""
 
+    each_step = False
+
     def __init__(self, end: float, stop_at: int | None):
         self.end, self.stop_at, self.found = end, stop_at, None
 
