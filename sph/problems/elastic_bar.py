@@ -20,7 +20,7 @@ from sph import quantity as units
 from sph.exact import solid_shocks
 from sph.problems import base
 from sph.problems.support import lattice as placement
-from sph.problems.support import oscillation, uniaxial
+from sph.problems.support import oscillation, solids, uniaxial
 from sph.quantity import Quantity
 
 _SHARED = base.Problem.model_fields
@@ -104,7 +104,7 @@ class Problem(base.Problem):
 
     def under(self, physics):
         """Return the problem with the strength of [physics]; ValueError for a gas."""
-        uniaxial.check_physics(physics)
+        solids.check_single(physics)
         found = self.model_copy()
         found._strength = physics.strength_model()
         found._off_lattice = uniaxial.is_off_on_lattice(physics)

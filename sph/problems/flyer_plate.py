@@ -20,7 +20,7 @@ from pydantic import Field, PrivateAttr, field_validator
 from sph.exact import solid_shocks
 from sph.problems import base
 from sph.problems.support import lattice as placement
-from sph.problems.support import solid_fronts, uniaxial
+from sph.problems.support import solid_fronts, solids, uniaxial
 
 _SHARED = base.Problem.model_fields
 
@@ -79,7 +79,7 @@ class Problem(base.Problem):
 
     def under(self, physics):
         """Return the problem with the material of [physics]; ValueError for a gas."""
-        uniaxial.check_physics(physics)
+        solids.check_single(physics)
         found = self.model_copy()
         found._material = solid_fronts.material(physics.eos_model(), physics.strength_model())
         found._off_lattice = uniaxial.is_off_on_lattice(physics)

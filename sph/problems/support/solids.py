@@ -5,25 +5,33 @@ import math
 import numpy as np
 
 
+def check_single(physics) -> None:
+    """Raise ValueError unless [physics] has one material, with a density at rest.
+
+    The message begins with a key of [physics].
+    """
+    if physics.formulation != "continuum":
+        raise ValueError(
+            f'physics.formulation = "{physics.formulation}": expected "continuum", which has '
+            'solids and liquids. Try: physics.formulation = "continuum"'
+        )
+    if physics.materials is not None:
+        raise ValueError("physics.materials is given: expected one material in this problem")
+    if not hasattr(physics.eos_model(), "rho_0"):
+        raise ValueError(
+            f"physics.eos = {physics.shown('eos')}: expected an equation of state of a solid or "
+            'liquid, with a density at rest rho_0. Try: "mie_gruneisen" or "tait"'
+        )
+
+
 def required(physics, liquid: bool = False):
     """Return equation of state and strength of the single material of [physics].
 
     Raises ValueError, with a message that begins with a key of [physics], for a material without a
     reference density, and unless the material has a strength; with `liquid`, if it has one.
     """
-    if physics.formulation != "continuum":
-        raise ValueError(
-            f'physics.formulation = "{physics.formulation}": expected "continuum"; this problem '
-            "needs an evolved density" + ("" if liquid else " and a strength")
-        )
-    if physics.materials is not None:
-        raise ValueError("physics.materials is given: expected one material in this problem")
+    check_single(physics)
     eos, strength = physics.eos_model(), physics.strength_model()
-    if not hasattr(eos, "c_0"):
-        raise ValueError(
-            f'physics.eos = "{eos.name}": expected an equation of state with a reference density, '
-            'such as "tait"'
-        )
     if liquid and strength is not None:
         raise ValueError("physics.strength: expected none, because this problem is about a liquid")
     if not liquid and strength is None:

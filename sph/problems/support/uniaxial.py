@@ -1,4 +1,4 @@
-"""Plane waves along x in solids: checks of [physics], a steel, box, initial state, stress."""
+"""Plane waves along x in solids: a steel, box, initial state, stress."""
 
 import numpy as np
 
@@ -18,22 +18,6 @@ OFF_LATTICE = (
     "gradients of orders -1 and 0 on a lattice are wrong by up to 3 %; try physics.correction = 1, "
     "or physics.spacing_ratio = 2",
 )
-
-
-def check_physics(physics) -> None:
-    """Raise ValueError unless [physics] selects a solid: its formulation and a density at rest."""
-    if physics.formulation != "continuum":
-        raise ValueError(
-            f'physics.formulation = "{physics.formulation}": expected "continuum", which has '
-            'solids. Try: physics.formulation = "continuum"'
-        )
-    if physics.materials is not None:
-        raise ValueError("physics.materials is given: expected one material in this problem")
-    if not hasattr(physics.eos_model(), "rho_0"):
-        raise ValueError(
-            f"physics.eos = {physics.shown('eos')}: expected an equation of state of a solid or "
-            'liquid, with a density at rest rho_0. Try: "mie_gruneisen" or "tait"'
-        )
 
 
 def is_off_on_lattice(physics) -> bool:
