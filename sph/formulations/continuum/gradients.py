@@ -5,12 +5,17 @@ from numba import njit
 
 from sph.arrays import empty
 from sph.compiled import COMPILED, INLINED
+from sph.formulations.continuum.matter import (
+    H_INV,
+    VOLUME,
+    H,
+    copy_matter,
+    of_pair,
+    power,
+)
 from sph.kernels import dw_over_q, normalisation, w
 from sph.neighbours.order import BLOCK
 from sph.passes.gather import (
-    TINY,
-    copy_box,
-    copy_vectors,
     fastest,
     largest_of,
     longest_list,
@@ -18,20 +23,14 @@ from sph.passes.gather import (
     near_blocks,
     near_particles,
     own_box,
-    place_block,
-    read,
     scratch,
     unit,
     unpacked,
 )
 from sph.simd import (
     at,
-    block_width,
-    dot,
     filled,
     full_dim,
-    inverse_sqrt,
-    lane_max,
     lane_sum,
     lane_sums,
     load,
@@ -39,16 +38,12 @@ from sph.simd import (
     minus,
     outer,
     plus,
-    store,
     symmetric_dim,
     symmetric_outer,
     times,
     width,
     zeros,
 )
-
-# Quantities of candidates after position and velocity.
-H, H_INV, VOLUME, NEXT = 0, 1, 2, 3
 
 # Condition number of M above which order 1 falls back to order 0; relative to the identity, M is
 # zero below the inverse of this number.
@@ -85,17 +80,10 @@ def gradients(
         for t in range(number):
             block, image = unpacked(lists.entries[lists.start[superblock] + t])
             to = t * len(fields) * BLOCK
-            place_block(lanes, dim, copied, to, position, block, neighbours, image, x_0, per_length)
-            to += D * BLOCK
-            copy_vectors(
-                lanes, dim, copied, to, velocity, block, neighbours, image, v_0, per_velocity
-            )
-            to += D * BLOCK
-            reach = copy_supports(lanes, copied, to, support, block, per_length)
-            copy_volumes(
-                lanes, copied, to + VOLUME * BLOCK, mass, density, block, C * per_length**D
-            )
-            copy_box(dim, boxes, t, neighbours, block, image, x_0, per_length, reach)
+            copy_matter(
+                lanes, dim, copied, to, boxes, t, block, neighbours, image, position, velocity,
+                mass, density, support, x_0, v_0, per_length, per_velocity, C,
+            )  # fmt: skip
         for block in range(begin, end):
             low, high = own_box(dim, neighbours, block, x_0, per_length)
             i_first, i_last = block * BLOCK, min((block + 1) * BLOCK, mass.size)
@@ -160,46 +148,6 @@ def gradients(
                         velocity_gradient[a, b, i] = L[a, b] / per_rate
                 div_v[i] = divergence / per_rate
                 density_rate[i] = -density[i] * (divergence / per_rate)  # eq 407
-
-
-# --- what the pair loops share ---
-
-
-@njit(**INLINED)
-def of_pair(lanes, r_ij, H_i, H_j):
-    """Return q = r/H_ij and 1/H_ij of eq 401, with H_ij = (H_i + H_j)/2."""
-    H_inv = 2.0 / (H_i + H_j)
-    squared = dot(r_ij, r_ij) + TINY
-    return squared * inverse_sqrt(squared) * H_inv, H_inv
-
-
-@njit(**INLINED)
-def power(dim, x):
-    """Return x^D."""
-    found = x
-    for _ in range(len(dim) - 1):
-        found = found * x
-    return found
-
-
-@njit(**INLINED)
-def copy_supports(lanes, copied, begin, support, block, per_length):
-    """Copy H and 1/H of a block; return the largest H."""
-    largest = 0.0
-    for lane in range(0, BLOCK, block_width(lanes)):
-        H_j = read(lanes, support, block, lane, 0.0) * per_length
-        store(copied, begin + H * BLOCK + lane, H_j)
-        store(copied, begin + H_INV * BLOCK + lane, inverse_sqrt(H_j * H_j + TINY))
-        largest = max(largest, lane_max(H_j))
-    return largest
-
-
-@njit(**INLINED)
-def copy_volumes(lanes, copied, begin, mass, density, block, factor):
-    """Copy V = m/rho of a block, times factor."""
-    for lane in range(0, BLOCK, block_width(lanes)):
-        V = read(lanes, mass, block, lane, 0.0) / read(lanes, density, block, lane, 1.0)
-        store(copied, begin + lane, V * factor)
 
 
 # --- small matrices (D, D) ---

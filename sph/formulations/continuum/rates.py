@@ -4,12 +4,12 @@ import numpy as np
 from numba import njit
 
 from sph.compiled import COMPILED, larger, smaller
-from sph.formulations.continuum.gradients import (
+from sph.formulations.continuum.matter import (
+    H_INV,
     NEXT,
     VOLUME,
     H,
-    copy_supports,
-    copy_volumes,
+    copy_matter,
     of_pair,
     power,
 )
@@ -25,17 +25,14 @@ from sph.kernels import dw_over_q, normalisation, w
 from sph.neighbours.order import BLOCK
 from sph.passes.gather import (
     also,
-    copy_box,
     copy_tensors,
     copy_values,
-    copy_vectors,
     largest_of,
     longest_list,
     middle,
     near_blocks,
     near_particles,
     own_box,
-    place_block,
     scratch,
     unit,
     unpacked,
@@ -61,8 +58,8 @@ from sph.simd import (
     zeros,
 )
 
-# Quantities of candidates after those of the gradient pass.
-RHO, C_S, LAST = NEXT, NEXT + 1, NEXT + 2
+# Quantities of candidates after those of `matter`.
+RHO, C_S = NEXT, NEXT + 1
 
 
 @njit(**COMPILED)
@@ -115,20 +112,12 @@ def rates(
         for t in range(number):
             block, image = unpacked(lists.entries[lists.start[superblock] + t])
             to = t * len(every) * BLOCK
-            place_block(lanes, dim, copied, to, position, block, neighbours, image, x_0, per_length)
-            to += D * BLOCK
-            copy_vectors(
-                lanes, dim, copied, to, velocity, block, neighbours, image, v_0, per_velocity
-            )
-            to += D * BLOCK
-            reach = copy_supports(lanes, copied, to, support, block, per_length)
-            copy_volumes(
-                lanes, copied, to + VOLUME * BLOCK, mass, density, block, C * per_length**D
-            )
-            copy_box(dim, boxes, t, neighbours, block, image, x_0, per_length, reach)
-            copy_values(lanes, copied, to + RHO * BLOCK, density, block, per_density)
-            copy_values(lanes, copied, to + C_S * BLOCK, sound_speed, block, 0.5 * per_velocity)
-            to += LAST * BLOCK
+            to = copy_matter(
+                lanes, dim, copied, to, boxes, t, block, neighbours, image, position, velocity,
+                mass, density, support, x_0, v_0, per_length, per_velocity, C,
+            )  # fmt: skip
+            to = copy_values(lanes, copied, to, density, block, per_density)
+            to = copy_values(lanes, copied, to, sound_speed, block, 0.5 * per_velocity)
             to = copy_values(lanes, copied, to, pressure, block, per_stress)
             to = copy_tensors(lanes, dim, copied, to, stress, block, neighbours, image, per_stress)
             to = copy_values(lanes, copied, to, balsara, block, 0.5)
@@ -146,7 +135,7 @@ def rates(
             reach = largest_of(support, i_first, i_last) * per_length
             blocks = near_blocks(lanes, dim, boxes, number, low, high, reach, chosen)
             nc = near_particles(
-                lanes, dim, copied, every, rest + 1, chosen, blocks, low, high, reach, near
+                lanes, dim, copied, every, rest + H_INV, chosen, blocks, low, high, reach, near
             )
             for i in range(i_first, i_last):
                 x_i = times(minus(at(dim, position, i), x_0), per_length)
