@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from sph import allocation, faults
-from sph.analysis import reference, summary
+from sph.analysis import reference, summary, trial
 from sph.clock import Clock
 from sph.config import Config
 from sph.errors import DeclarationError, FileError, NumericalError, Stopped, first_line
@@ -32,29 +32,42 @@ SAME_TIME = 1e-9
 
 
 def run(config: Config, directory: RunDirectory, progress) -> dict:
-    """Run `config` from its initial state in an empty run directory. Return the summary.
+    """Run `config` from its initial state. Return the summary.
 
-    progress: see `sph.progress.Messages` and `Lines`. Raises NumericalError and Stopped, after the
-    files of the run are written, and FileError.
+    directory: its files of an earlier run are removed once there is an initial state. progress: see
+    `sph.progress.Messages` and `Lines`. Raises NumericalError and Stopped, after the files of the
+    run are written; FileError, ConfigError and others, before the first checkpoint without leaving
+    a run directory.
     """
-    with session(directory, config, progress) as (stopped_by, clock):
+    with (
+        session(directory, config, progress) as (stopped_by, clock),
+        directory.withdrawn_unless_begun(),
+    ):
         progress.note("preparing the initial state")
-        simulation = Simulation.of_problem(Scene(config), threads_of(config), clock)
-        directory.write_config(config.to_toml())
-        if source := getattr(config.problem, "source", b""):
-            directory.write_problem(source)
-        try:
-            simulation.begin()
-        except NumericalError as error:
-            raise _failed_at_start(error, simulation, directory) from error
-        if simulation.held_supports:
-            progress.note(
-                f"{simulation.held_supports} particle(s) have too few neighbours: their support "
-                f"radius is limited to {simulation.scene.max_support:.4g} (physics.max_support)"
-            )
-        history = new_history(config, simulation, directory)
-        runner = Runner(config, directory, simulation, history, progress, stopped_by)
-        return runner.from_start()
+        with closing(Simulation.of_problem(Scene(config), threads_of(config), clock)) as simulation:
+            directory.make_room()
+            directory.write_config(config.to_toml())
+            if source := getattr(config.problem, "source", b""):
+                directory.write_problem(source)
+            _begin(simulation, directory, progress)
+            history = new_history(config, simulation, directory)
+            runner = Runner(config, directory, simulation, history, progress, stopped_by)
+            return runner.from_start()
+
+
+def _begin(simulation: Simulation, directory: RunDirectory, progress) -> None:
+    """Prepare the first step, and try a user's problem. Raises NumericalError and others."""
+    try:
+        simulation.begin()
+    except NumericalError as error:
+        raise _failed_at_start(error, simulation, directory) from error
+    if simulation.held_supports:
+        progress.note(
+            f"{simulation.held_supports} particle(s) have too few neighbours: their support "
+            f"radius is limited to {simulation.scene.max_support:.4g} (physics.max_support)"
+        )
+    for note in trial.notes(simulation):
+        progress.note(note)
 
 
 @contextmanager
@@ -79,7 +92,6 @@ def _failed_at_start(
     error: NumericalError, simulation: Simulation, directory: RunDirectory
 ) -> NumericalError:
     """Return the error with a table of neighbours; there is no history or checkpoint yet."""
-    simulation.close()
     words = offenders.leave(directory.offenders, state_of(simulation), error.particle)
     return NumericalError(f"{error}\n{words}".rstrip(), error.particle)
 
@@ -266,16 +278,18 @@ class Runner:
         return state_of(self.simulation, self.lineage)
 
     def _close(self, status: str, reason: str | None = None) -> dict:
+        simulation = self.simulation
         self._record()
         self.history.flush()
-        self.simulation.end()
-        result = summary.of_run(
-            self.simulation,
-            read_history(self.directory.history),
-            status=status,
-            reason=reason,
-            lineage=self.lineage,
-        )
+        simulation.end()
+        past = read_history(self.directory.history)
+        try:
+            result = summary.of_run(simulation, past, status, reason, self.lineage)
+        except DeclarationError as error:
+            raise DeclarationError(
+                f"{error}\nThe checkpoints of the run are complete: mend the file, then "
+                f"`sph restart {quoted(self.directory.path)}` writes the summary."
+            ) from error.__cause__
         self.directory.write_summary(result)
         named = self.config.report.reference
         if named and status == "done":  # the summary is already written, if this fails

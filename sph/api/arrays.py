@@ -10,6 +10,7 @@ import numpy as np
 from pydantic import Field, PrivateAttr
 
 from sph import config as configuration
+from sph.api.concise import concise
 from sph.api.view import View
 from sph.clock import Clock
 from sph.errors import ConfigError
@@ -76,6 +77,7 @@ class Simulation(View):
     >>> wave.close()
     """
 
+    @concise
     def __init__(
         self,
         position: Any,
@@ -129,6 +131,7 @@ class Simulation(View):
         super().__init__(engine)
         self._columns: dict[str, list] = {}
 
+    @concise
     def advance(self, until: float) -> None:
         """Take time steps until the time `until`, at which the last one ends exactly.
 

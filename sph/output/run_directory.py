@@ -7,12 +7,12 @@ import re
 import shutil
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
 
-from sph.errors import FileError
+from sph.errors import FileError, NumericalError
 from sph.output import checkpoint, history, same_run
 from sph.output.checkpoint import Checkpoint
 from sph.output.files import (
@@ -47,18 +47,24 @@ MARK = "# The resolved configuration of a run of sph.\n"
 
 @dataclass(frozen=True)
 class RunDirectory:
-    """Paths in a run directory. Only `path` and `path`/checkpoints must exist."""
+    """Paths in a run directory. Only `path` and `path`/checkpoints must exist.
+
+    made: config.toml and directories that did not exist before `create`, the innermost first.
+    """
 
     path: Path
+    made: tuple[Path, ...] = field(default=(), compare=False, repr=False)
 
     @classmethod
     def create(cls, path: Path, force: bool = False) -> "RunDirectory":
-        """Create an empty run directory at `path`, and its parents.
+        """Create a run directory at `path`, and its parents.
 
-        With `force`, the files of an earlier run in it are removed, and no others. Raises FileError
-        if `path` holds other files, or an earlier run and `force` is false.
+        Files of an earlier run stay until `make_room`. Raises FileError if `path` holds other
+        files, or an earlier run and `force` is false.
         """
-        run = cls(Path(path))
+        path = Path(path)
+        paths = (path / "config.toml", path / "checkpoints", path, *path.parents)
+        run = cls(path, tuple(one for one in paths if not one.exists()))
         with explained(f"cannot write to {path}"):
             if run.path.exists() and not run.path.is_dir():
                 raise FileError(f"{path} is a file.\nTry: another directory, with -o.")
@@ -71,8 +77,8 @@ class RunDirectory:
             refuse_link(run._checkpoint_directory)
             run._checkpoint_directory.mkdir(parents=True, exist_ok=True)
             with run.alone():
-                if there:
-                    run._make_room(force)
+                if there and not force:
+                    run._refuse_begun()
                 run._remove_unfinished()
         return run
 
@@ -266,18 +272,55 @@ class RunDirectory:
             os.close(descriptor)
             os.close(home)
 
-    def _make_room(self, force: bool) -> None:
-        begun = self.checkpoints() or (self.history.exists() and not self._ended_at_once())
-        if begun and not force:
+    def _refuse_begun(self) -> None:
+        if self.checkpoints() or (self.history.exists() and not self._ended_at_once()):
             raise FileError(
                 f"{self.path} already holds a run.\nTry: --force to replace it, "
                 f"`sph restart {quoted(self.path)}` to continue it, or another directory, with -o."
             )
-        if self.figures.is_dir() and not self.figures.is_symlink():
-            shutil.rmtree(self.figures)
-        for path in (self.history, self.summary, self.offenders, self.problem, *self.checkpoints()):
-            path.unlink(missing_ok=True)
-        self.write_config("")  # keeps MARK, so that this remains a run directory
+
+    def make_room(self) -> None:
+        """Remove the files of an earlier run, and no others. Raises FileError."""
+        with explained(f"cannot remove the files of an earlier run in {self.path}"):
+            if self.figures.is_dir() and not self.figures.is_symlink():
+                shutil.rmtree(self.figures)
+            for path in (
+                self.history, self.summary, self.offenders, self.problem, *self.checkpoints()
+            ):  # fmt: skip
+                path.unlink(missing_ok=True)
+            if self.config.exists():
+                self.write_config("")  # keeps MARK, so that this remains a run directory
+
+    @contextmanager
+    def withdrawn_unless_begun(self, is_copy: bool = False) -> Iterator[None]:
+        """If the block fails before there is a checkpoint, remove what it made of the directory.
+
+        is_copy: whether checkpoints in a directory that `create` made are only copies.
+
+        A NumericalError leaves the directory, with its configuration and offenders.h5. Files of an
+        earlier run stay if the block fails before `make_room`.
+        """
+        try:
+            yield
+        except NumericalError:
+            raise
+        except BaseException:
+            if not self.checkpoints() or (is_copy and self.path in self.made):
+                with suppress(OSError, FileError):
+                    self.make_room()
+            self._remove_made()
+            raise
+
+    def _remove_made(self) -> None:
+        """Remove config.toml and the directories that `create` made, unless a file is left."""
+        if self.checkpoints():
+            return
+        with suppress(OSError):
+            for one in self.made:
+                if one.is_dir():
+                    one.rmdir()
+                else:
+                    one.unlink(missing_ok=True)
 
     def _ended_at_once(self) -> bool:
         """Return whether the run ended in its first step, so that nothing of value is lost."""
