@@ -139,7 +139,7 @@ def _of_source(path: str, source: bytes) -> type[Outside]:
     )
     name = {"name": _fixed(stem)} if found.model_fields["name"].is_required() else {}
     made = _extended(found, path, **name, file=(str, file), file_sha256=(str, digest))
-    made.source = source
+    made.source, made.paths = source, ("file", *found.paths)
     return made
 
 

@@ -189,6 +189,11 @@ class Problem(Section):
         """
         return None
 
+    @property
+    def has_exact(self) -> bool:
+        """Whether there is an `exact` of this problem, which may return None for some keys."""
+        return type(self).exact is not Problem.exact
+
     def departs(self, physics) -> str | None:
         """Return why the exact solution and the theory do not apply to [physics], or None.
 

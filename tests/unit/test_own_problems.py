@@ -118,6 +118,26 @@ def test_copy_of_configuration_finds_problem_file(home, tmp_path_factory, text):
     assert ("# mine" in copy.read_text()) == ("# mine" in text)
 
 
+def test_copy_of_configuration_has_absolute_paths_that_problem_declares(home, tmp_path_factory):
+    text = (
+        CLOUDS
+        + """
+    paths: ClassVar = ("table",)
+    table: str = Field(default="", description="a file")
+    radii: str = Field(default="", description="no file")
+"""
+    )
+    (home / "clouds.py").write_text(text)
+    keys = 'file = "clouds.py"\ntable = "a.csv"\nradii = "a.csv"\n'
+    (home / "clouds.toml").write_text(f"[problem]\n{keys}")
+    copy = tmp_path_factory.mktemp("copy") / "base.toml"
+    copy.write_text(copies.read_to_copy(home / "clouds.toml"))
+    found = configuration.load(copy).problem
+    assert found.file == str(home / "clouds.py")
+    assert (found.table, found.radii) == (str(home / "a.csv"), "a.csv")
+    assert found.table == configuration.load(home / "clouds.toml").problem.table
+
+
 @pytest.mark.slow
 def test_sweep_finds_problem_file(home):
     done = sph_(

@@ -43,7 +43,8 @@ def make(
         )
     states = States(found.checkpoints)
     with style.paper():
-        view.check(found.last())
+        view.check(last := found.last())
+        view = view._replace(field=view.field or maps.main_field(last))  # one for all frames
         plane = view.plane(states, maps.PIXELS)
         scale = _scale(states, view, plane)
         path = Path(target) if target else _in_figures(found)
