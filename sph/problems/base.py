@@ -111,7 +111,8 @@ class Problem(Section):
         description="number of particles; the lattice uses the nearest number that fits",
     )
     domain: list[float] | list[list[float]] = Field(
-        description="ends of the box: [lo, hi] for all axes, or a list with one [lo, hi] per axis"
+        description="ends of the box: [lo, hi] for all axes, or a list with one [lo, hi] per axis",
+        examples=[[0.0, 1.0]],
     )
     boundary: Boundary | list[Boundary] = Field(
         description='"periodic", "mirror" (reflecting wall) or "open" (vacuum outside) for all '
