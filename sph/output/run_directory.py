@@ -34,6 +34,9 @@ from sph.summary import Summary, of_json
 
 CHECKPOINT_NAME = re.compile(r"checkpoint_(\d{6,})\.h5")
 
+# The end of a message on a run without checkpoints.
+AGAIN = "\nTry: `sph run`, to start the run again."
+
 # A checkpoint of a failed run is valid if its energy drift is below this fraction of
 # physics.max_energy_drift: shortly before a failure the drift grows by more than that per step.
 GOOD = 0.1
@@ -146,15 +149,15 @@ class RunDirectory:
         Raises Damaged if there is none, and FileError if a later one cannot be read, since that one
         may be valid.
         """
-        reason = "it has no checkpoints.\nTry: `sph run`, to start the run again"
+        reason = f"has no checkpoint.{AGAIN}"
         for path in reversed(self.checkpoints()):
             try:
                 checkpoint.read(path)
             except Damaged as error:
-                reason = str(error)
+                reason = f"has no valid checkpoint: {error}"
             else:
                 return path
-        raise Damaged(f"{self.path} cannot be restarted: {reason}")
+        raise Damaged(f"{self.path} {reason}")
 
     def last_good(self) -> Path:
         """Return the last checkpoint of a failed run that was written before its energy drifted.

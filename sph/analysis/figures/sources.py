@@ -12,7 +12,7 @@ from sph.analysis.figures import style
 from sph.domain import Domain
 from sph.errors import FileError
 from sph.output import checkpoint, same_run
-from sph.output.run_directory import RunDirectory, find
+from sph.output.run_directory import AGAIN, RunDirectory, find
 from sph.problems.support import uniaxial
 from sph.quantity import FIELDS
 
@@ -98,7 +98,7 @@ def find_source(path: Path) -> Source:
         run = RunDirectory.open(path)
         found = tuple(run.checkpoints())
         if not found:
-            raise FileError(f"{path} has no checkpoints, so there is nothing to draw.")
+            raise FileError(f"{path} has no checkpoints, so there is nothing to draw.{AGAIN}")
         return Source(path, run, found)
     home, path = find(path)
     return Source(path, home, (path,))
