@@ -2,13 +2,13 @@
 
 import itertools
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Set
 from contextlib import closing, contextmanager, suppress
 from pathlib import Path
 
 import numpy as np
 
-from sph import allocation, faults
+from sph import allocation, columns, faults
 from sph.analysis import reference, summary, trial
 from sph.clock import Clock
 from sph.config import Config
@@ -66,6 +66,8 @@ def _begin(simulation: Simulation, directory: RunDirectory, progress) -> None:
             f"{simulation.held_supports} particle(s) have too few neighbours: their support "
             f"radius is limited to {simulation.scene.max_support:.4g} (physics.max_support)"
         )
+    if note := faults.mostly_empty(simulation.scene, simulation.particles):
+        progress.note(note)
     for note in trial.notes(simulation):
         progress.note(note)
 
@@ -117,13 +119,14 @@ def state_of(simulation: Simulation, lineage: tuple[str, ...] = ()) -> Checkpoin
 
 
 def new_history(config: Config, simulation: Simulation, directory: RunDirectory) -> History:
-    extra = [*simulation.columns(), *config.problem.diagnostics(simulation.particles)]
-    if twice := sorted({name for name in extra if extra.count(name) > 1}):
+    problem = config.problem
+    there, own = [*simulation.columns()], [*problem.diagnostics(simulation.particles)]
+    if twice := sorted({*columns.shared(problem.dimension), *there} & {*own}):
         raise DeclarationError(
-            f"the columns {', '.join(twice)} of the history are declared by a part and by the "
-            f"problem {config.problem.name}"
+            f"the problem {problem.name}: diagnostics returned {', '.join(twice)}, which the "
+            "history has already; expected other names"
         )
-    return History.create(directory.history, config.problem.dimension, extra)
+    return History.create(directory.history, problem.dimension, [*there, *own])
 
 
 def threads_of(config: Config) -> int:
@@ -249,17 +252,26 @@ class Runner:
     def _record(self) -> None:
         """Add the rows of the steps since the last call to the history."""
         simulation, problem = self.simulation, self.config.problem
-        for columns in simulation.take_rows():
+        for row in simulation.take_rows():
             for name, before in (
                 ("wall_seconds", self.wall_before),
                 ("cpu_seconds", self.cpu_before),
             ):
-                columns[name] = [round(before + seconds, 6) for seconds in columns[name]]
+                row[name] = [round(before + seconds, 6) for seconds in row[name]]
             if problem.has_diagnostics:  # a row at a time
                 with simulation.clock.phase("diagnostics"):
                     found = problem.diagnostics(simulation.particles)
-                columns |= {name: [value] for name, value in found.items()}
-            self.history.extend(columns)
+                row |= {name: [value] for name, value in found.items()}
+                self._check_names(found.keys(), row.keys())
+            self.history.extend(row)
+
+    def _check_names(self, diagnostics: Set[str], columns: Set[str]) -> None:
+        known = {*self.history.columns}
+        if wrong := sorted((diagnostics - known) | (known - columns)):
+            raise DeclarationError(
+                f"the problem {self.config.problem.name}: diagnostics returned {', '.join(wrong)} "
+                "in some steps only; expected the names of the first step in all steps"
+            )
 
     def _write_checkpoint(self) -> None:
         """Flush the history, then write the checkpoint."""

@@ -4,6 +4,7 @@ Without it, faults in `exact`, `report` and others would end a run only after it
 """
 
 from collections.abc import Iterator
+from contextlib import contextmanager
 
 import numpy as np
 
@@ -27,13 +28,14 @@ def notes(simulation) -> Iterator[str]:
     problem, eos = config.problem, config.physics.eos_model()
     if not isinstance(problem, Outside):
         return
-    _exact(config, particles.position)
     times = np.linspace(0.0, config.time.end, ROWS)
-    truth.theory(config, times)
     row = rows.of_simulation(simulation)
-    row |= {name: [value] for name, value in problem.diagnostics(particles).items()}
-    history = {name: np.array(values * ROWS) for name, values in row.items()} | {"t": times}
     end, pressure = _last_time(config), simulation.scene.formulation.pressure(particles)
+    with _read_only([*particles.arrays().values(), pressure, times]):
+        _exact(config, particles.position)
+        truth.theory(config, times)
+        row |= {name: [value] for name, value in problem.diagnostics(particles).items()}
+    history = {name: np.array(values * ROWS) for name, values in row.items()} | {"t": times}
     calls = [lambda: problem.report(eos, end, particles, pressure)]
     if truth.departure(config, end) is None:
         calls.append(lambda: problem.compare(eos, end, particles, pressure))
@@ -41,11 +43,25 @@ def notes(simulation) -> Iterator[str]:
         calls.append(lambda: problem.over_time(eos, history))
     for call in calls:
         try:
-            call()
+            with _read_only([*particles.arrays().values(), pressure]):
+                call()
         except DeclarationError as error:
             if not _depends_on_values(error.__cause__):
                 raise
             yield f"in a trial call with the initial state, {error}"
+
+
+@contextmanager
+def _read_only(arrays: list[np.ndarray]) -> Iterator[None]:
+    """Let a method that would change the particles, and so the run, fail here."""
+    were = [one.flags.writeable for one in arrays]
+    try:
+        for one in arrays:
+            one.flags.writeable = False
+        yield
+    finally:
+        for one, was in zip(arrays, were, strict=True):
+            one.flags.writeable = was
 
 
 def _last_time(config: Config) -> float:
@@ -58,6 +74,7 @@ def _exact(config: Config, position: np.ndarray) -> None:
     """Call what tells the exact solution and where it holds, at the start and at the end."""
     problem, eos = config.problem, config.physics.eos_model()
     few = position[:, np.arange(POINTS) % position.shape[1]]
+    few.flags.writeable = False
     for time in (0.0, _last_time(config)):
         truth.region(problem, eos, time, few)
         try:
@@ -76,5 +93,7 @@ def _depends_on_values(cause: BaseException | None) -> bool:
     if isinstance(cause, IndexError):
         return "size 0" in str(cause) or "out of range" in str(cause)
     if isinstance(cause, ValueError):
-        return not any(word in str(cause) for word in ("broadcast", "shape", "dimension"))
+        return not any(
+            word in str(cause) for word in ("broadcast", "shape", "dimension", "read-only")
+        )
     return isinstance(cause, ArithmeticError)

@@ -209,14 +209,21 @@ def _check_defaults(found: type[base.Problem], origin: str) -> None:
 
 def _class_in(module: ModuleType, where: str) -> type[base.Problem]:
     if not hasattr(module, "Problem"):
-        raise DeclarationError(f"{where}: expected a class Problem")
+        others = [name for name, one in vars(module).items() if _is_problem(one)]
+        instead = f", but it has {', '.join(others)}" if others else ""
+        raise DeclarationError(f"{where}: expected a class Problem{instead}")
     return _checked(module.Problem, where)
 
 
+def _is_problem(found: Any) -> bool:
+    return isinstance(found, type) and issubclass(found, base.Problem)
+
+
 def _checked(found: Any, where: str) -> type[base.Problem]:
-    if not isinstance(found, type) or not issubclass(found, base.Problem):
+    if not _is_problem(found):
         raise DeclarationError(
-            f"{where}: Problem is not a subclass of sph.problems.base.Problem, as it must be"
+            f"{where}: Problem is not a subclass of sph.problems.base.Problem, as it must be.\n"
+            "Try: `from sph.problems import base`, and class Problem(base.Problem)."
         )
     if found is base.Problem or found.initial is base.Problem.initial:
         raise DeclarationError(f"{where}: expected a class Problem with a method initial")

@@ -12,20 +12,24 @@ from pydantic import ValidationError
 from sph.errors import DeclarationError, SphError
 from sph.problems.support import returned
 
+NEWLINE = "\n"
+
 
 @contextmanager
 def reported(origin: str, method: str = "") -> Iterator[None]:
     """Raise DeclarationError for exceptions in the file `origin` of a problem.
 
     The message has file, line and source line. The cause is the exception, with a traceback that
-    begins in that file. Errors with a meaning stay: those of sph, those of validation, ValueError
-    of `under`, and MemoryError.
+    begins in that file. Errors with a meaning stay: those of sph, those of validation outside
+    methods, ValueError of `under`, and MemoryError.
     """
     try:
         yield
-    except (SphError, ValidationError, MemoryError):
+    except (SphError, MemoryError):
         raise
     except (Exception, SystemExit) as error:
+        if isinstance(error, ValidationError) and not method:
+            raise
         if isinstance(error, ValueError) and method == "under":
             raise
         words = _words(error, origin, method)
@@ -70,7 +74,10 @@ def _definition(method: Callable, origin: str) -> str:
 
 
 def _words(error: BaseException, origin: str, method: str) -> str:
-    text = f"{type(error).__name__}: {error}".rstrip(": ")
+    text = f"{type(error).__name__}: {str(error).partition(NEWLINE)[0]}".rstrip(": ")
+    if isinstance(error, ValidationError) and error.errors()[0]["type"] == "frozen_instance":
+        name = error.errors()[0]["loc"][0]
+        text = f"self.{name} is set: keys of a problem do not change. Try: a local variable"
     if isinstance(error, SyntaxError) and error.lineno:
         where, line = f"{error.filename}, line {error.lineno}", error.text
         text = f"SyntaxError: {error.msg}"

@@ -15,6 +15,7 @@ from click.testing import CliRunner
 from sph import config as configuration
 from sph import fingerprint
 from sph.analysis import trial
+from sph.analysis.info import settings
 from sph.cli import main
 from sph.clock import Clock
 from sph.config import copies, outside
@@ -73,6 +74,8 @@ def test_problem_file_gives_name_keys_defaults_and_diagnostics(home):
     assert found.problem.file_sha256 == digest_of(home / "clouds.py")
     assert (found.problem.n, found.problem.radius, found.problem.contrast) == (256, 0.2, 4.0)
     assert found.physics.gamma == 5.0 / 3.0
+    changed = [one["key"] for one in settings.different(found)]
+    assert changed == ["problem.n", "problem.radius", "time.end", "output.interval", "run.threads"]
     summary = json.loads((run(home) / "summary.json").read_text())
     assert summary["problem"] == "clouds"
     header, first = (home / "run" / "history.csv").read_text().splitlines()[:2]
@@ -388,6 +391,10 @@ LATE = [
     ("compare", "particles[2].position[2, 0]", "in compare: IndexError: index 2 is out of bounds"),
     ("compare", "self.compared", "in compare: AttributeError: "),
     ("over_time", "history['kinetic']", "in over_time: KeyError: 'kinetic'"),
+    ("diagnostics", "particles.velocity.fill(0) or {}", "ValueError: assignment destination is re"),
+    ("report", "particles[2].density.fill(1) or {}", "ValueError: assignment destination is read-"),
+    ("diagnostics", "{'a,b': 1.0}", "the name 'a,b'; expected a name without commas"),
+    ("diagnostics", "setattr(self, 'n', 3)", "self.n is set: keys of a problem do not change. Tr"),
 ]
 
 
@@ -407,7 +414,7 @@ def test_fault_of_late_method_is_found_before_first_step(home, method, value, wo
     done = sph_("run", home / "clouds.toml", "-o", home / "run")
     assert done.exit_code == 2, done.output
     assert words in done.stderr
-    line = last if f"in {method}: " in words else last - 1
+    line = last if f", in {method}: " in done.stderr else last - 1
     assert f"{home / 'clouds.py'}, line {line}" in done.stderr
     assert "Traceback" not in done.stderr
 
@@ -427,6 +434,18 @@ def test_method_that_fails_only_with_initial_values_is_noted(home, method, value
     (note,) = trial.notes(simulation)
     assert f"in a trial call with the initial state, {home / 'clouds.py'}, line " in note
     assert f"in {method}: " in note
+
+
+def test_class_of_another_name_is_named(home):
+    edited(home, "class Problem(", "class Clouds(")
+    with pytest.raises(ConfigError, match="expected a class Problem, but it has Clouds"):
+        configuration.load(home / "clouds.toml")
+
+
+def test_negative_initial_energy_is_refused_with_remedy(home):
+    edited(home, "eos.internal_energy(density, 1.0)", "eos.internal_energy(density, -1.0)")
+    done = sph_("run", home / "clouds.toml", "-o", home / "run")
+    assert (done.exit_code, "are not negative" in done.stderr) == (3, True), done.output
 
 
 def test_wrong_arguments_are_refused_with_expected_ones(home):
@@ -454,6 +473,24 @@ def test_problem_of_package_sph_is_not_tried(monkeypatch):
     simulation = SimpleNamespace(scene=Scene(found), particles=None)
     monkeypatch.setattr(type(found.problem), "exact", lambda *_: pytest.fail("exact was called"))
     assert list(trial.notes(simulation)) == []
+
+
+@pytest.mark.parametrize(
+    ("value", "words"),
+    [
+        ("{'t': 1.0}", "diagnostics returned t, which the history has already"),
+        ("{f'a{len(self.model_dump.cache)}': 1.0}", "in some steps only; expected the names of"),
+    ],
+)
+def test_wrong_names_of_diagnostics_are_refused(home, value, words):
+    with_method(home, "diagnostics", value.replace("len(self.model_dump.cache)", "count()"))
+    text = (home / "clouds.py").read_text()
+    calls = "import itertools\n_calls = itertools.count()\n"
+    # another name from the first step on: the trial and the header of the history call before
+    counted = f"{calls}\n\ndef count():\n    return max(0, next(_calls) - 2)\n\n\nclass Problem"
+    (home / "clouds.py").write_text(text.replace("class Problem", counted))
+    done = sph_("run", home / "clouds.toml", "-o", home / "run")
+    assert (done.exit_code, words in done.stderr) == (2, True), done.output
 
 
 # --- runs that fail before their first checkpoint, or at their end -----------------------------

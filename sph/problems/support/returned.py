@@ -128,6 +128,13 @@ def _fault_of_numbers(problem, found: Any, *_, **__) -> str:
     return ""
 
 
+def _fault_of_columns(problem, found: Any, *_, **__) -> str:
+    """Columns of the history, whose names are the first line of a CSV file."""
+    fault = _fault_of_numbers(problem, found)
+    wrong = [] if fault else [name for name in found if not name or set(name) & set(',"\n\r')]
+    return fault or (f"the name {wrong[0]!r}; expected a name without commas" if wrong else "")
+
+
 def _words(value: Any) -> str:
     text = repr(value)
     return text if len(text) < 60 else f"a {type(value).__name__}"
@@ -141,7 +148,7 @@ CHECKS: dict[str, Callable[..., str]] = {
     "error_region": _fault_of_region,
     "departs": _fault_of_reason,
     "theory": _fault_of_theory,
-    "diagnostics": _fault_of_numbers,
+    "diagnostics": _fault_of_columns,
     "report": _fault_of_numbers,
     "compare": _fault_of_numbers,
     "over_time": _fault_of_numbers,

@@ -2,8 +2,10 @@
 
 import numpy as np
 import pytest
+from click.testing import CliRunner
 
 from sph import config, kernels
+from sph.cli import main
 from sph.domain import Domain
 from sph.errors import ConfigError
 from sph.problems._region import Region
@@ -285,3 +287,12 @@ def test_one_table_in_place_of_list_is_refused_with_remedy(messages):
 def test_number_of_particles_written_as_real_is_refused_with_remedy():
     with pytest.raises(ConfigError, match=r"n = 1000\.0: expected .*, such as n = 1000$"):
         config.from_text('[problem]\nname = "regions"\nn = 1e3\n')
+
+
+def test_run_whose_relaxation_fails_leaves_no_directory(tmp_path):
+    (tmp_path / "a.toml").write_text(scene(EVERYWHERE))
+    arguments = ["run", tmp_path / "a.toml", "-o", tmp_path / "run", "--set",
+                 "problem.relax={ residual = 1e-9, iterations = 2 }"]  # fmt: skip
+    done = CliRunner().invoke(main, [str(one) for one in arguments])
+    assert (done.exit_code, "after 2 iterations" in done.stderr) == (2, True), done.output
+    assert [one.name for one in tmp_path.iterdir()] == ["a.toml"]
