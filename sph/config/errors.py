@@ -47,16 +47,21 @@ def wrong_value(path: Path, value: Any, annotation: Any, example: Any = None) ->
 
     example: a valid value of the key, None if no example is known.
     """
-    key = next((str(step) for step in reversed(path) if isinstance(step, str)), "")
     kinds = [_plain(one)[0] for one in branches(annotation)]
-    hint = f", such as {key} = {value_text(example)}" if example is not None else ""
+    hint = _such_as(path, example)
     if isinstance(value, str) and (close := nearest(value, valid_names(annotation))):
         hint = f'; did you mean "{close}"?'
     elif isinstance(value, float) and value.is_integer() and int in kinds:
-        hint = f", such as {key} = {int(value)}"
+        hint = _such_as(path, int(value))
     elif isinstance(value, dict) and any(_is_list_of_tables(one) for one in kinds):
         hint = f". Try: [[{dotted(path)}]] for each, in place of [{dotted(path)}]"
     return Issue(path, f"= {_found(value)}: expected {describe(annotation)}{hint}")
+
+
+def _such_as(path: Path, example: Any) -> str:
+    """Return the end of a message with an example of the key that a path leads to."""
+    key = next((str(step) for step in reversed(path) if isinstance(step, str)), "")
+    return "" if example is None else f", such as {key} = {value_text(example)}"
 
 
 def not_finite(value: Any, path: Path = ()) -> Iterator[Issue]:
@@ -292,8 +297,9 @@ def _issues(
         case "value_error" | "assertion_error":
             return [Issue(path, f": {error['ctx']['error']}")]
         case "missing":
-            annotation = inner(model, located.path)
-            return [Issue(path, f"is missing: expected {describe(annotation)}")]
+            annotation, example = inner(model, located.path), _example(model, located.path)
+            text = f"is missing: expected {describe(annotation)}"
+            return [Issue(path, text + _such_as(path, example))]
         case "extra_forbidden":
             holder = inner(model, located.path[:-1])
             return [_unknown_key(path, holder, elsewhere if len(path) == 2 else {})]

@@ -278,8 +278,8 @@ class RunDirectory:
     def _refuse_begun(self) -> None:
         if self.checkpoints() or (self.history.exists() and not self._ended_at_once()):
             raise FileError(
-                f"{self.path} already holds a run.\nTry: --force to replace it, "
-                f"`sph restart {quoted(self.path)}` to continue it, or another directory, with -o."
+                f"{self.path} already holds a run.\nTry: --force (in Python force=True) to replace "
+                f"it, `sph restart {quoted(self.path)}` to continue it, or another directory, with -o."
             )
 
     def make_room(self) -> None:
