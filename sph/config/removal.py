@@ -32,7 +32,7 @@ def issues(
             text = f"= {NONE}: expected a value; only a whole key of [{path[0]}] takes {NONE}"
             found.append(Issue(path, text))
         elif _default(problem, path, fields[key]) is not None:
-            text = f"= {NONE}: expected a value; only keys that need not be given take {NONE}"
+            text = f"= {NONE}: expected a value; only keys without a default take {NONE}"
             found.append(Issue(path, text))
     return found
 
