@@ -133,7 +133,7 @@ class Relaxation(TypedDict):
         float,
         Quantity(
             "mean of the density sums over the density of the problem, minus 1: an error of the "
-            "kernel, which a lattice has as well"
+            "kernel sum, which lattices have as well"
         ),
     ]
     cpu_seconds: Annotated[
