@@ -164,7 +164,8 @@ def _shorten_tables(rows: Sequence[Row]) -> None:
         differ = [name for name in names if any(one.get(name) != tables[0].get(name)
                                                 for one in tables)]  # fmt: skip
         for row, table in zip(those, tables, strict=True):
-            row.settings[key] = {n: table[n] for n in differ if n in table} or "given"
+            left = [f"{name}={value_text(table[name])}" for name in differ if name in table]
+            row.settings[key] = f"{{{', '.join(left)}}}" if left else "given"
 
 
 def _is_plain_table(value: Any) -> bool:

@@ -172,7 +172,7 @@ def on_glass(tmp_path):
 
 def test_table_that_some_runs_lack_is_shortened(on_glass):
     assert [line.label for line in compared(on_glass).series] == [
-        "relax = none", "relax = { seed = 0 }", "relax = { seed = 1 }",
+        "relax = none", "relax = {seed=0}", "relax = {seed=1}",
     ]  # fmt: skip
     fewer = compared(*(on_glass / one for one in ("none", "{seed = 0}")))
     assert [line.label for line in fewer.series] == ["relax = given", "relax = none"]
@@ -635,6 +635,20 @@ def test_pictures_several_sweeps_have_one_panel_each(tmp_path):
     ]
     assert CliRunner().invoke(main, ["report", str(first), str(second)]).exit_code == 0
     assert "| wide | { min = 0.1, max = 2.0" in (first / "report" / "report.md").read_text()
+
+
+def test_pictures_sweeps_with_same_lines_share_one_legend(tmp_path):
+    from sph.analysis.figures import report as pictures
+
+    sweeps = [sweep_of(tmp_path / name, "1.0,2.0", 1.0) for name in ("coarse", "fine")]
+    report = compared(*sweeps)
+    for picture in (pictures.error_against_cost(report), pictures.error_against_number(report)):
+        assert [panel.get_legend() for panel in picture.axes] == [None, None]
+        (legend,) = picture.legends
+        names = [text.get_text() for text in legend.get_texts()]
+        assert [name for name in names if "alpha" in name] == [r"$\alpha$ = 1.0", r"$\alpha$ = 2.0"]
+    other = compared(sweeps[0], sweep_of(tmp_path / "more", "1.0,3.0", 1.0))
+    assert all(panel.get_legend() for panel in pictures.error_against_cost(other).axes)
 
 
 def test_picture_labels_are_short():
