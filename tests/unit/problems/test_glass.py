@@ -1,5 +1,7 @@
 """Relaxation to a glass: densities, regularity, boundaries, and what stops it."""
 
+import shutil
+
 import numpy as np
 import pytest
 from scipy.spatial import cKDTree
@@ -170,6 +172,14 @@ def test_summary_tells_how_relaxation_ended(glass_run):
         assert one["meaning"]
     assert "Relaxation to a glass" in run_page.text(info.of(directory.path), [])
     assert "eq 461" in words.in_words(info.of(directory.path))
+
+
+def test_info_of_unfinished_run_tells_how_relaxation_ended(glass_run, tmp_path):
+    directory, summary = glass_run
+    shutil.copytree(directory.path, tmp_path / "run")
+    (tmp_path / "run" / "summary.json").unlink()
+    found = {one["name"]: one["value"] for one in info.of(tmp_path / "run")["figures"]}
+    assert found == {f"relaxation.{name}": value for name, value in summary["relaxation"].items()}
 
 
 def test_restart_keeps_how_relaxation_ended(glass_run, tmp_path):
