@@ -48,10 +48,10 @@ def test_cost_of_relaxation_is_in_the_cost(report):
         spent = row.relaxation["cpu_seconds"]
         session = row.ended["cost"]["session"]
         phases = dict(session["phases_cpu_seconds"])
-        del phases["start of Numba"]
+        del phases["start of Numba"], phases["output"]  # the last output follows the last row
         # four digits after the point are kept of each phase
         assert phases["initial state"] == pytest.approx(spent, abs=1e-4)
-        assert cost >= sum(phases.values()) - 1e-3 > spent > 0.0
+        assert cost >= sum(phases.values()) - 1e-3 > spent
         # 10 iterations and more of Python over thousands of pairs
         assert read_history(row.path / "history.csv")["cpu_seconds"][0] >= spent > 0.01
 
