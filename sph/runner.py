@@ -22,7 +22,7 @@ from sph.output.history import read as read_history
 from sph.output.run_directory import RunDirectory
 from sph.scene import Scene
 from sph.shell_words import quoted
-from sph.simulation import Simulation
+from sph.simulation import PLACING, Simulation
 from sph.steps import MOST
 from sph.stop_signals import stop_signals
 from sph.threads import available_processors
@@ -49,6 +49,9 @@ def run(config: Config, directory: RunDirectory, progress) -> dict:
             directory.write_config(config.to_toml())
             if source := getattr(config.problem, "source", b""):
                 directory.write_problem(source)
+            if ended := simulation.relaxation:
+                spent = round(clock.seconds[PLACING], 4)
+                directory.write_relaxation({**ended._asdict(), "cpu_seconds": spent})
             _begin(simulation, directory, progress)
             history = new_history(config, simulation, directory)
             runner = Runner(config, directory, simulation, history, progress, stopped_by)
@@ -296,7 +299,9 @@ class Runner:
         simulation.end()
         past = read_history(self.directory.history)
         try:
-            result = summary.of_run(simulation, past, status, reason, self.lineage)
+            result = summary.of_run(
+                simulation, past, status, reason, self.lineage, self.directory.read_relaxation()
+            )
         except DeclarationError as error:
             raise DeclarationError(
                 f"{error}\nThe checkpoints of the run are complete: mend the file, then "
