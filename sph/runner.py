@@ -300,8 +300,9 @@ class Runner:
         past = read_history(self.directory.history)
         try:
             result = summary.of_run(
-                simulation, past, status, reason, self.lineage, self.directory.read_relaxation()
-            )
+                simulation, past, status=status, reason=reason, lineage=self.lineage,
+                relaxation=self.directory.read_relaxation(),
+            )  # fmt: skip
         except DeclarationError as error:
             raise DeclarationError(
                 f"{error}\nThe checkpoints of the run are complete: mend the file, then "
