@@ -28,6 +28,7 @@ from sph.output.files import (
     replacing,
     write_text,
 )
+from sph.output.frames import Frames
 from sph.output.json_text import json_text
 from sph.shell_words import quoted
 from sph.summary import Summary, of_json
@@ -107,6 +108,10 @@ class RunDirectory:
     def offenders(self) -> Path:
         """Path of the file in which a failed run stores the particles at which it failed."""
         return self.path / "offenders.h5"
+
+    @property
+    def frames(self) -> Frames:
+        return Frames(self.path / "frames")
 
     @property
     def figures(self) -> Path:
@@ -277,6 +282,7 @@ class RunDirectory:
             shutil.rmtree(self.figures)
         for path in (self.history, self.summary, self.offenders, self.problem, *self.checkpoints()):
             path.unlink(missing_ok=True)
+        self.frames.drop_after(-1)
         self.write_config("")  # keeps MARK, so that this remains a run directory
 
     def _ended_at_once(self) -> bool:
