@@ -32,7 +32,7 @@ FRAMES = """## Frames
 With `output.frames = N` a run writes N frames for movies, evenly spaced from t = 0 to `time.end`:
 `frames/frame_00000123.h5` holds the end of step 123. Frames change no step and no result: a frame
 shows the end of the step that first reaches its time, and states the true time. Steps that are
-longer than the spacing make fewer frames. A frame has about a fifth of the bytes of a checkpoint.
+longer than the spacing make fewer frames. A frame has a seventh of the bytes of a checkpoint.
 `sph` writes a frame under a temporary name and renames it, so a frame is either complete or absent,
 and a run that is killed keeps its frames. A restart removes frames of later steps than its
 checkpoint, and continues.

@@ -11,7 +11,7 @@ from sph.analysis.figures import style
 from sph.columns import shared as shared_columns
 from sph.config import Config
 from sph.integrators.step_size import CRITERIA
-from sph.quantity import TIME
+from sph.quantity import MOMENTUM, TIME
 
 ENERGIES = (
     ("total_energy", "total", "black", "-"),
@@ -48,7 +48,10 @@ def figure(
     change = max(float(np.ptp(history[name])) for name in momentum)
     is_conserved = change < ROUND_OFF * _momentum_scale(history, mass)
     if is_conserved:
-        title += f"\nmomentum is conserved to round-off, within {style.number(change)}"
+        unit = style.unit_symbol(MOMENTUM, config.units) if config else ""
+        title += (
+            f"\nmomentum is conserved to round-off, within {style.number(change)} {unit}".rstrip()
+        )
     picture, panels = _panels(4 - is_conserved + len(further))
     free = iter(panels)
     _energies(next(free), history, theory)
@@ -76,7 +79,8 @@ def _add_units(panels, columns: Sequence[str], config: Config) -> None:
     for panel, name in zip(panels, columns, strict=True):
         known = meanings.of_column(config, name)
         if known is not None:
-            panel.set_ylabel(style.labelled(panel.get_ylabel(), known.unit, config.units))
+            label = style.labelled(panel.get_ylabel(), known.unit, config.units)
+            panel.set_ylabel(style.in_two_lines(label))
 
 
 def _momentum_scale(history, mass: float) -> float:
