@@ -244,6 +244,26 @@ class RunDirectory:
             return {}
         return found if isinstance(found, dict) else {}
 
+    def is_running(self) -> bool:
+        """Return whether a run is going on in the directory.
+
+        On file systems without locks, whether the summary is missing.
+        """
+        try:
+            descriptor = os.open(self._checkpoint_directory, os.O_RDONLY | os.O_DIRECTORY)
+        except OSError:  # moved or removed
+            return False
+        try:
+            fcntl.flock(descriptor, fcntl.LOCK_SH | fcntl.LOCK_NB)
+        except BlockingIOError:
+            return True
+        except OSError:
+            return not self.summary.exists()
+        else:
+            return False
+        finally:
+            os.close(descriptor)
+
     @contextmanager
     def alone(self) -> Iterator[None]:
         """Lock the directory within the block. Raises FileError if another process has locked it.
