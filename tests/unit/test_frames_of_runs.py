@@ -94,6 +94,30 @@ def test_restart_continues_frames(filmed, tmp_path, is_in_place):
     assert hashes(after) == hashes(filmed)
 
 
+def test_restart_with_other_steps_keeps_no_frame_of_the_old_ones(tmp_path):
+    directory = run(tmp_path / "run", f"output.frames={FRAMES}")
+    restarting.restart(directory.checkpoint_path(1), ["physics.C=0.1"], None, progress.Lines())
+    times = read_history(directory.history)["t"]
+    found = [frames.read(path, TUBE) for path in directory.frames.paths()]
+    assert [one.time for one in found] == [times[one.step] for one in found]
+    assert len(found) == FRAMES
+
+
+def test_frame_is_written_before_the_checkpoint_of_its_step(tmp_path, monkeypatch):
+    """A restart from that checkpoint would not write the frame."""
+    found = {}
+
+    def note(path, state):
+        found[state.step] = RunDirectory(path.parent.parent).frames.paths()
+        write(path, state)
+
+    write = checkpoints.write
+    monkeypatch.setattr(checkpoints, "write", note)
+    directory = run(tmp_path / "run", "output.frames=5")  # at the times of checkpoints
+    assert [len(paths) for paths in found.values()] == [1, 2, 3, 4, 5]
+    assert all(paths == directory.frames.up_to(step) for step, paths in found.items())
+
+
 def test_restart_may_begin_frames(plain, tmp_path):
     number = 2
     _, after = restarting.restart(

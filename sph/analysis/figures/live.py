@@ -7,6 +7,7 @@ import time
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -25,6 +26,7 @@ POLL = 0.5  # seconds between looks at the run directory
 # Looks that find no process in the run directory before the run counts as ended: a run that begins
 # unlocks its directory for a moment.
 MOST_QUIET = 2
+WINDOW = (10.0, 7.0)  # inches, at most
 TOOLKITS = ("QtAgg", "TkAgg", "GTK4Agg", "GTK3Agg")  # of windows, the first that is installed
 
 
@@ -36,23 +38,34 @@ class Window:
         from matplotlib import pyplot
 
         pyplot.switch_backend(toolkit)
-        self._pyplot = pyplot
-        self._figure = pyplot.figure(title, figsize=(8.0, 6.5))
+        self._pyplot, self._title = pyplot, title
+        self._figure: Any = None  # opened with the first picture, whose shape it has
+
+    def _open(self, ratio: float) -> None:
+        """Open the window; ratio: of its width to its height."""
+        height = min(WINDOW[1], WINDOW[0] / ratio)
+        self._figure = self._pyplot.figure(self._title, figsize=(ratio * height, height))
         self._axes = self._figure.add_axes((0.0, 0.0, 1.0, 1.0))
-        self._axes.set_axis_off()
         self._figure.show()
 
     def show(self, picture: Figure) -> str:
         """Show a picture; returns what was done, in words."""
+        pixels = np.asarray(Image.open(_png(picture)))
+        height, width = pixels.shape[:2]
+        if self._figure is None:
+            self._open(width / height)
         self._axes.clear()
         self._axes.set_axis_off()
-        self._axes.imshow(np.asarray(Image.open(_png(picture))))
+        self._axes.imshow(pixels)
         self._figure.canvas.draw_idle()
         self._figure.canvas.flush_events()
         return "drew"
 
     def wait(self, seconds: float) -> bool:
         """Wait, and keep the window responsive; returns whether the window is still open."""
+        if self._figure is None:
+            time.sleep(seconds)
+            return True
         self._figure.canvas.start_event_loop(seconds)
         return self._pyplot.fignum_exists(self._figure.number)
 

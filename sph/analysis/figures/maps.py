@@ -157,7 +157,7 @@ def _projected(state: State, field: str, plane: Plane) -> tuple[str, np.ndarray,
         return "column_density", np.where(column > 0.0, column, np.nan), label
     values = state.scalar(field)[None]
     (means,), _ = along_sight(values, state.particles, state.domain, state.kernel, plane)
-    return field, means, state.labelled(f"{style.label(field)}, mean by mass", field)
+    return field, means, state.labelled(f"{style.label(field)}, mean weighted by mass", field)
 
 
 def side_by_side(maps: Sequence[_Map], scale=None) -> Figure:

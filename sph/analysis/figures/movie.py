@@ -1,4 +1,4 @@
-"""Movies of runs: frames of one size, one scale of colours and, of profiles, one set of axes."""
+"""Movies of runs: pictures that share their size, scale of colours and axes."""
 
 import functools
 import importlib

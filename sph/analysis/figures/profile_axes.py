@@ -1,4 +1,4 @@
-"""Vertical axes of profiles: the limits and scale of one picture, or of all frames of a movie."""
+"""Vertical axes of profiles, for one picture or all frames of a movie."""
 
 from collections.abc import Iterable, Sequence
 from typing import NamedTuple

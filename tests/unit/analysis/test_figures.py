@@ -620,7 +620,7 @@ def test_slice_and_projection_have_the_other_two_axes(blast):
         (View(slice=(0, 0.1)), "$y$", "$z$", "at $x$ = 0.1", r"density $\rho$"),
         (View(slice=(1, 0.1)), "$x$", "$z$", "at $y$ = 0.1", r"density $\rho$"),
         (View("speed", projection=2), "$x$", "$y$", "projected along $z$",
-         r"speed $|\mathbf{v}|$, mean by mass"),
+         r"speed $|\mathbf{v}|$, mean weighted by mass"),
         (View(projection=1), "$x$", "$z$", "projected along $y$", r"column density $\Sigma$"),
     ):  # fmt: skip
         picture = figure([state], view)
