@@ -24,6 +24,8 @@ from sph.output.files import explained, refuse_link, replacing
 FORMATS = (".gif", ".mp4")
 COLOURS = 256  # of a gif
 
+Drawn = Callable[[States], Iterator[np.ndarray]]  # the pixels of the frames of these states
+
 
 def make(
     source: Path, target: Path | None, view: View, per_second: int = 10, dpi: int | None = None
@@ -42,8 +44,9 @@ def make(
     with style.paper():
         picture = _pictures(states, view, found.last())
         path = Path(target) if target else _in_figures(found)
+        drawn = functools.partial(_frames, drawn=picture, dpi=dpi or style.DPI)
         with replacing(path) as unfinished:
-            write(_frames(states, picture, dpi or style.DPI), unfinished, per_second)
+            write(drawn, states, unfinished, per_second)
     return path
 
 
@@ -109,22 +112,26 @@ def _writer(target: Path) -> Callable:
     return functools.partial(_write_mp4, ffmpeg)
 
 
-def _write_gif(frames: Iterator[np.ndarray], file: BinaryIO, per_second: int) -> None:
-    """One palette for all frames, of the first and the last, so that no colour flickers."""
-    images = [Image.fromarray(pixels) for pixels in frames]
-    both = Image.new("RGB", (images[0].width, 2 * images[0].height))
-    both.paste(images[0], (0, 0))
-    both.paste(images[-1], (0, images[0].height))
+def _write_gif(drawn: Drawn, states: States, file: BinaryIO, per_second: int) -> None:
+    """One palette for all frames, of the first and the last, so that no colour flickers.
+
+    Pillow keeps all frames in memory, a byte for each pixel.
+    """
+    both = Image.fromarray(np.concatenate([*drawn(states.ends())]))
     palette = both.quantize(COLOURS)
-    first, *others = (one.quantize(palette=palette, dither=Image.Dither.NONE) for one in images)
+    first, *others = (
+        Image.fromarray(pixels).quantize(palette=palette, dither=Image.Dither.NONE)
+        for pixels in drawn(states)
+    )
     first.save(
         file, format="gif", save_all=True, append_images=others, loop=0, optimize=False,
         duration=round(1000 / per_second),
     )  # fmt: skip
 
 
-def _write_mp4(ffmpeg, frames: Iterator[np.ndarray], file: BinaryIO, per_second: int) -> None:
+def _write_mp4(ffmpeg, drawn: Drawn, states: States, file: BinaryIO, per_second: int) -> None:
     """The encoder writes files only: to one of its own, which is copied."""
+    frames = drawn(states)
     first = next(frames)
     height, width = first.shape[:2]
     with tempfile.TemporaryDirectory() as directory:

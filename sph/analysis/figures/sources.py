@@ -85,6 +85,10 @@ class States:
     paths: Sequence[Path]
     config: Config | None = None
 
+    def ends(self) -> "States":
+        """The first and the last state."""
+        return States([self.paths[0], self.paths[-1]], self.config)
+
     def __iter__(self) -> Iterator["State"]:
         first = None
         for path in self.paths:
