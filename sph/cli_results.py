@@ -40,7 +40,9 @@ def map_options(command):
         click.option("--zoom", nargs=4, type=float, metavar="X0 X1 Y0 Y1",
                      help="Draw this part of the domain: ends of the horizontal and of the "
                      "vertical axis. Default: all of it."),
-        click.option("--log", "is_log", is_flag=True, help="Use a logarithmic scale of colours."),
+        click.option("--log", "is_log", is_flag=True,
+                     help="Use a logarithmic scale of colours, of four decades at most without "
+                     "--range."),
         click.option("--range", "limits", nargs=2, type=float, metavar="LO HI",
                      help="Ends of the scale of colours. Default: those of the values."),
         click.option("--field", type=click.Choice(MAP_FIELDS),

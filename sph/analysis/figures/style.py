@@ -162,11 +162,16 @@ def scale(values) -> Normalize:
         return Normalize(0.0, 1.0)
     low, high = float(finite.min()), float(finite.max())
     if low > 0.0 and (high > 1000.0 * low or high > 10.0 * float(np.median(finite))):
-        return LogNorm(max(low, high / 10.0**MOST_DECADES), high)
+        return LogNorm(lowest_of_log(low, high), high)
     if high - low <= 1e-6 * abs(high):  # uniform gas: do not magnify round-off
         margin = 0.1 * abs(high) or 1.0
         return Normalize(low - margin, high + margin)
     return Normalize(low, high)
+
+
+def lowest_of_log(low: float, high: float) -> float:
+    """The lower end of a logarithmic scale for values from `low` to `high`."""
+    return max(low, high / 10.0**MOST_DECADES)
 
 
 def label(name: str) -> str:

@@ -109,7 +109,8 @@ class View(NamedTuple):
                 f"--log: the lowest value is {low:.3g}, but a logarithm needs values above 0.\n"
                 "Try: --range LO HI with LO above 0."
             )
-        return LogNorm(low, high)
+        # the tails of kernels at the edge of gas span any number of decades
+        return LogNorm(low if self.limits else style.lowest_of_log(low, high), high)
 
 
 def figure(states, view: View) -> Figure:

@@ -43,7 +43,9 @@ def test_history_has_units_of_its_columns(tmp_path):
     states = [state_of("kelvin_helmholtz", *GALAXY, time=t) for t in (0.0, 0.5)]
     run = write_run(tmp_path / "run", states)
     made = config.from_text(run.config.read_text())
-    panels = history.figure(read(run.history), "a run", None, made).axes
+    steps = read(run.history)
+    steps["mode_amplitude"] = np.array([1.0, 2.0])
+    panels = history.figure(steps, "a run", None, made).axes
     energy = r"[$M_\odot\,\mathrm{kpc}^{2}\,\mathrm{Myr}^{-2}$]"
     assert panels[0].get_ylabel() == f"energy $E$ {energy}"
     assert panels[1].get_ylabel() == "energy drift"

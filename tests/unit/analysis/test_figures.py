@@ -609,6 +609,15 @@ def test_map_of_line_is_refused(messages, tube):
         figures.draw([tube.path], view=View("density"))
 
 
+def test_logarithmic_scale_has_four_decades_unless_given():
+    found = View(is_log=True).scale(1e-9, 2.0)
+    assert (found.vmin, found.vmax) == (2e-4, 2.0)
+    found = View(is_log=True).scale(0.1, 2.0)
+    assert (found.vmin, found.vmax) == (0.1, 2.0)
+    found = View(limits=(1e-9, 2.0), is_log=True).scale(0.1, 0.2)
+    assert (found.vmin, found.vmax) == (1e-9, 2.0)
+
+
 @pytest.fixture
 def blast(tmp_path):
     return write_run(tmp_path / "blast", [state_of("point_explosion", time=t) for t in (0.1, 0.2)])
@@ -697,6 +706,21 @@ def test_history_figure_leaves_out_zeros_and_round_off_of_momentum(shear):
     assert "round-off" not in picture.get_suptitle()
 
 
+def test_history_figure_names_constants_in_place_of_flat_panels(shear):
+    found = read_history(shear.history)
+    found["mode_amplitude"] = np.array([1.0, 2.0])
+    found["volume_ratio"] = np.array([0.9975, 0.9975 * (1.0 + 1e-15)])
+    found["held_supports"] = np.array([0.0, 0.0])
+    picture = history.figure(found, "a run")
+    labels = [panel.get_ylabel() for panel in picture.axes]
+    assert not any("volume" in label or "held" in label for label in labels)
+    assert (
+        picture.get_suptitle() == "a run\n" + r"$\sum m/\rho$ over the volume is 0.998 throughout"
+    )
+    found["held_supports"] = np.array([0.0, 1.0])
+    assert "held supports" in [panel.get_ylabel() for panel in history.figure(found, "a").axes]
+
+
 def test_history_legends_cover_no_data(shear):
     picture = history.figure(read_history(shear.history), "a run")
     picture.draw_without_rendering()
@@ -708,6 +732,7 @@ def test_history_legends_cover_no_data(shear):
 def test_history_figure_shows_gravitational_energy_and_theory_of_energies(shear):
     found = read_history(shear.history)
     found["gravitational_energy"] = np.array([-2.0, -3.0])
+    found["mode_amplitude"] = np.array([1.0, 2.0])
     beside = {name: np.array([1.0, 2.0]) for name in ("kinetic_energy", "gravitational_energy")}
     panels = history.figure(found, "a run", beside).axes
     assert len(panels) == 5  # no panel of its own, unlike the mode's amplitude
