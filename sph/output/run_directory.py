@@ -244,11 +244,8 @@ class RunDirectory:
             return {}
         return found if isinstance(found, dict) else {}
 
-    def is_running(self) -> bool:
-        """Return whether a run is going on in the directory.
-
-        On file systems without locks, whether the summary is missing.
-        """
+    def is_running(self) -> bool | None:
+        """Return whether a process has locked the directory; None on file systems without locks."""
         try:
             descriptor = os.open(self._checkpoint_directory, os.O_RDONLY | os.O_DIRECTORY)
         except OSError:  # moved or removed
@@ -258,7 +255,7 @@ class RunDirectory:
         except BlockingIOError:
             return True
         except OSError:
-            return not self.summary.exists()
+            return None
         else:
             return False
         finally:

@@ -127,7 +127,7 @@ def watch(
     shown, seen, quiet = target_of(directory, target), None, 0
     while quiet < MOST_QUIET:
         # before the look at the outputs, so that the last one is not missed
-        quiet = 0 if directory.is_running() else quiet + 1
+        quiet = 0 if _is_going_on(directory) else quiet + 1
         signs = _signs(directory)
         if signs != seen and (state := newest(directory)) is not None:
             seen = signs
@@ -160,6 +160,12 @@ def newest(directory: RunDirectory) -> State | None:
                     return State(later if later.step > found.step else found)
             return State(found)
     return None
+
+
+def _is_going_on(directory: RunDirectory) -> bool:
+    """Whether a run has locked the directory or, where there are no locks, lacks its summary."""
+    is_running = directory.is_running()
+    return not directory.summary.exists() if is_running is None else is_running
 
 
 def _existing(paths: Callable[[], list[Path]]) -> list[Path]:

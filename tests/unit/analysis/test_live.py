@@ -99,6 +99,13 @@ def test_run_without_outputs_is_refused(messages, tube):  # noqa: F811
         watched(tube)
 
 
+def test_without_locks_the_summary_ends_the_drawing(tube, monkeypatch):  # noqa: F811
+    monkeypatch.setattr(type(tube), "is_running", lambda self: None)
+    assert live._is_going_on(tube)
+    tube.write_summary({"status": "done"})
+    assert watched(tube)[1] == "the run is done"
+
+
 def test_other_formats_and_sources_are_refused(messages, tube, shear, tmp_path):  # noqa: F811
     with messages.raised(ConfigError):
         watched(tube, target=tmp_path / "a.pdf")
