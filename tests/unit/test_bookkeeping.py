@@ -289,7 +289,13 @@ def closing(session, monkeypatch):
 
 def test_summary_covers_all_rows_with_status_reason_and_lineage(closing):
     closing._close("failed", "it broke")
-    given = {"status": "failed", "reason": "it broke", "lineage": ("one line",), "rows": 1}
+    given = {
+        "status": "failed",
+        "reason": "it broke",
+        "lineage": ("one line",),
+        "relaxation": None,
+        "rows": 1,
+    }
     assert closing.told == [("summary", given)]
     assert len(closing.written) == 1
 
