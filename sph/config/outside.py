@@ -171,7 +171,7 @@ def _extended(found: type[base.Problem], origin: str, **keys: Any) -> type[Outsi
 
 def _check_attributes(found: type[base.Problem], origin: str) -> None:
     """Raise DeclarationError for class attributes that only figures and the summary read."""
-    known = FIELDS.keys() - {"x", "r", "velocity_phi"}
+    known = FIELDS.keys() - {"x", "r", "velocity_phi", "column_density"}
     unknown = [name for name in found.profiles if name not in known]
     if unknown or len(found.profiles) != 4:
         raise DeclarationError(

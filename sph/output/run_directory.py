@@ -28,6 +28,7 @@ from sph.output.files import (
     replacing,
     write_text,
 )
+from sph.output.frames import Frames
 from sph.output.json_text import json_text
 from sph.shell_words import quoted
 from sph.summary import Summary, of_json
@@ -66,7 +67,8 @@ class RunDirectory:
         files, or an earlier run and `force` is false.
         """
         path = Path(path)
-        paths = (path / "config.toml", path / "checkpoints", path, *path.parents)
+        inside = (path / name for name in ("config.toml", "checkpoints", "frames"))
+        paths = (*inside, path, *path.parents)
         run = cls(path, tuple(one for one in paths if not one.exists()))
         with explained(f"cannot write to {path}"):
             if run.path.exists() and not run.path.is_dir():
@@ -121,6 +123,10 @@ class RunDirectory:
     def offenders(self) -> Path:
         """Path of the file in which a failed run stores the particles at which it failed."""
         return self.path / "offenders.h5"
+
+    @property
+    def frames(self) -> Frames:
+        return Frames(self.path / "frames")
 
     @property
     def figures(self) -> Path:
@@ -257,6 +263,23 @@ class RunDirectory:
         """
         return _json_object(self.summary)
 
+    def is_running(self) -> bool | None:
+        """Return whether a process has locked the directory; None on file systems without locks."""
+        try:
+            descriptor = os.open(self._checkpoint_directory, os.O_RDONLY | os.O_DIRECTORY)
+        except OSError:  # moved or removed
+            return False
+        try:
+            fcntl.flock(descriptor, fcntl.LOCK_SH | fcntl.LOCK_NB)
+        except BlockingIOError:
+            return True
+        except OSError:
+            return None
+        else:
+            return False
+        finally:
+            os.close(descriptor)
+
     @contextmanager
     def alone(self) -> Iterator[None]:
         """Lock the directory within the block. Raises FileError if another process has locked it.
@@ -300,6 +323,7 @@ class RunDirectory:
             files = (self.history, self.summary, self.offenders, self.problem, self.relaxation)
             for path in (*files, *self.checkpoints()):
                 path.unlink(missing_ok=True)
+            self.frames.drop_after(-1)
             if self.config.exists():
                 self.write_config("")  # keeps MARK, so that this remains a run directory
 
