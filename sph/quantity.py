@@ -19,6 +19,10 @@ RATE = "time^-1"
 SECONDS = "s"
 CPU_SECONDS = "CPU s"
 
+# Least and largest unit of length, mass and time in cm, g and s: products of powers of units are
+# then finite numbers.
+UNIT_RANGE = (1e-40, 1e40)
+
 
 class Quantity(NamedTuple):
     """A number of the output.
