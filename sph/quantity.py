@@ -39,12 +39,13 @@ class Quantity(NamedTuple):
 # Fields of particles in figures and profiles.
 FIELDS = {
     "x": Quantity("position along x", LENGTH),
-    "r": Quantity("distance from the centre of the problem", LENGTH),
+    "r": Quantity("distance from the centre of the problem, which moves with the flow", LENGTH),
     "density": Quantity("density", DENSITY),
     "velocity": Quantity("velocity along the coordinate of the profile", VELOCITY),
-    "velocity_phi": Quantity("velocity across the radius", VELOCITY),
-    "v_r": Quantity("velocity along the radius", VELOCITY),
-    "v_phi": Quantity("velocity across the radius, anticlockwise", VELOCITY),
+    "v_r": Quantity("velocity along the radius, relative to the centre", VELOCITY),
+    "v_phi": Quantity(
+        "velocity across the radius, anticlockwise, relative to the centre", VELOCITY
+    ),
     "speed": Quantity("size of the velocity", VELOCITY),
     "pressure": Quantity("pressure", PRESSURE),
     "internal_energy": Quantity("internal energy per unit mass", SPECIFIC_ENERGY),
