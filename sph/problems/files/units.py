@@ -1,4 +1,4 @@
-"""Units of files with initial states: those that a file states, and conversion to those of a run.
+"""Units that files with initial states are in, and conversion to those of the run.
 
 Names of attributes: SWIFT's group /Units; Springel (2005), MNRAS 364, 1105 (GADGET-2) and its
 descendants GADGET-4, AREPO and GIZMO, which write their parameters to /Header or /Parameters.

@@ -1,6 +1,7 @@
-"""Positions and velocities about the centre of a problem, which moves with the problem's drift.
+"""Positions and velocities about the centre of a problem, which may move.
 
-Exact solutions of vortices, errors, figures and exports take r, v_r and v_phi from here.
+The centre moves with the drift of the problem. Exact solutions of vortices, errors, figures and
+exports take r, v_r and v_phi from here.
 """
 
 import numpy as np

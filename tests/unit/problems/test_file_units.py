@@ -111,6 +111,16 @@ def test_without_units_on_one_side_numbers_are_as_they_are(messages, tmp_path):
         messages.check(text)
 
 
+def test_configuration_of_an_earlier_version_is_complete_without_the_file(tmp_path):
+    """As in its checkpoints, from which a restart begins."""
+    path = written(tmp_path / "ic.hdf5", ic_files.particles())
+    text = made(path).to_toml()
+    assert "file_units = []\n" in text
+    path.unlink()
+    found = config.from_text(text.replace("file_units = []\n", "") + RUN)
+    assert (found.problem.file_units, found.problem.remarks()) == (None, [])
+
+
 def test_contents_in_units_of_another_configuration_are_not_reused(tmp_path):
     state = ic_files.particles()
     path = written(tmp_path / "ic.hdf5", state, Units=SWIFT)
