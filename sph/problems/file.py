@@ -150,12 +150,13 @@ class Problem(base.Problem):
         """Return what becomes of the units of the file; nothing if none are stated anywhere."""
         of_file, of_run = self._conversion
         if of_file is None:
-            text = "states no units: its numbers are taken as they are, in the units of [units]"
+            text = "states no units: its numbers are taken as they are, in the units of [units]."
             return [f"{self.path} {text}"] if of_run and self.file_units is not None else []
         words = "length {:.6g} cm, mass {:.6g} g, time {:.6g} s".format(*of_file)
         if of_run is not None:
-            become = "has the units of [units]" if of_file == of_run else "is converted to [units]"
-            return [f"{self.path}, whose units are {words}, {become}"]
+            if of_file == of_run:
+                return [f"{self.path} is in the units of [units]."]
+            return [f"{self.path}: numbers are converted from its units ({words}) to [units]."]
         return [
             f"{self.path} states units: {words}. Its numbers are taken as they are, and the output "
             "states no units, because the configuration has no [units].\nTry, to keep these units: "
