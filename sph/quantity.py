@@ -41,6 +41,7 @@ FIELDS = {
     "x": Quantity("position along x", LENGTH),
     "r": Quantity("distance from the centre of the problem, which moves with the flow", LENGTH),
     "density": Quantity("density", DENSITY),
+    "column_density": Quantity("mass per area along a line of sight", "mass length^-2"),
     "velocity": Quantity("velocity along the coordinate of the profile", VELOCITY),
     "v_r": Quantity("velocity along the radius, relative to the centre", VELOCITY),
     "v_phi": Quantity(

@@ -28,6 +28,7 @@ from sph.output.files import (
     replacing,
     write_text,
 )
+from sph.output.frames import Frames
 from sph.output.json_text import json_text
 from sph.shell_words import quoted
 from sph.summary import Summary, of_json
@@ -104,9 +105,18 @@ class RunDirectory:
         return self.path / "problem.py"
 
     @property
+    def relaxation(self) -> Path:
+        """Path of how relaxation to a glass ended; summaries of later restarts contain it too."""
+        return self.path / "relaxation.json"
+
+    @property
     def offenders(self) -> Path:
         """Path of the file in which a failed run stores the particles at which it failed."""
         return self.path / "offenders.h5"
+
+    @property
+    def frames(self) -> Frames:
+        return Frames(self.path / "frames")
 
     @property
     def figures(self) -> Path:
@@ -208,6 +218,14 @@ class RunDirectory:
         with replacing(self.problem) as unfinished:
             unfinished.write(source)
 
+    def write_relaxation(self, ended: Mapping) -> None:
+        """Write how relaxation to a glass ended, atomically. Raises FileError."""
+        write_text(self.relaxation, json_text(ended))
+
+    def read_relaxation(self) -> dict | None:
+        """Return how relaxation ended; None without relaxation, or if the file cannot be read."""
+        return _json_object(self.relaxation) or None
+
     def write_summary(self, summary: Mapping) -> None:
         """Write summary.json atomically, with non-finite numbers as "nan", "inf" and "-inf".
 
@@ -233,11 +251,24 @@ class RunDirectory:
 
         For the status of a run that may not have ended; `whole_summary` has the figures.
         """
+        return _json_object(self.summary)
+
+    def is_running(self) -> bool | None:
+        """Return whether a process has locked the directory; None on file systems without locks."""
         try:
-            found = json.loads(read_text(self.summary))
-        except (OSError, FileError, ValueError, RecursionError):
-            return {}
-        return found if isinstance(found, dict) else {}
+            descriptor = os.open(self._checkpoint_directory, os.O_RDONLY | os.O_DIRECTORY)
+        except OSError:  # moved or removed
+            return False
+        try:
+            fcntl.flock(descriptor, fcntl.LOCK_SH | fcntl.LOCK_NB)
+        except BlockingIOError:
+            return True
+        except OSError:
+            return None
+        else:
+            return False
+        finally:
+            os.close(descriptor)
 
     @contextmanager
     def alone(self) -> Iterator[None]:
@@ -275,8 +306,10 @@ class RunDirectory:
             )
         if self.figures.is_dir() and not self.figures.is_symlink():
             shutil.rmtree(self.figures)
-        for path in (self.history, self.summary, self.offenders, self.problem, *self.checkpoints()):
+        files = (self.history, self.summary, self.offenders, self.problem, self.relaxation)
+        for path in (*files, *self.checkpoints()):
             path.unlink(missing_ok=True)
+        self.frames.drop_after(-1)
         self.write_config("")  # keeps MARK, so that this remains a run directory
 
     def _ended_at_once(self) -> bool:
@@ -289,6 +322,15 @@ class RunDirectory:
     def _remove_unfinished(self) -> None:
         for directory in (self.path, self._checkpoint_directory):
             remove_unfinished(directory)
+
+
+def _json_object(path: Path) -> dict:
+    """Return the JSON object in a file, empty if there is none or it cannot be read."""
+    try:
+        found = json.loads(read_text(path))
+    except (OSError, FileError, ValueError, RecursionError):
+        return {}
+    return found if isinstance(found, dict) else {}
 
 
 def checkpoint_number(path: Path) -> int | None:
