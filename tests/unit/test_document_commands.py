@@ -5,27 +5,18 @@ create are created, and commands run as they stand, but for settings that make r
 """
 
 import argparse
-import ast
-import importlib.util
-import os
 import re
 import runpy
 import shutil
-import subprocess
 import sys
-import tomllib
 from pathlib import Path
-from types import SimpleNamespace
 
 import click
 import pytest
-from click.testing import CliRunner
 from document_blocks import PAGES, ROOT, Block, blocks, words
+from document_reader import Reader, is_mention, parsed
 
-from sph import config as configuration
-from sph.cli import main
-from sph.errors import SphError
-from sph.sweep import local, task
+from sph.sweep import local
 
 # Commands that do not run here, by how they begin; of `sph` and of scripts the options are checked.
 NOT_RUN = {
@@ -74,8 +65,6 @@ BEFORE = {
 # Further files that a page takes for granted, and where they come from.
 GIVEN = {"docs/initial_states.md": {"ic.hdf5": "sph/problems/files/two_clouds.hdf5"}}
 PLACEHOLDER = re.compile(r"…|\b(?:[A-Z]{3,}|DIR)\b(?!\])")
-FEW = {1: 100, 2: 400, 3: 1000}  # particles of a shortened run, by dimension
-PART = 0.05  # of its time
 
 
 def name_of(page: Path) -> str:
@@ -96,23 +85,6 @@ def is_left_out(command: str) -> bool:
 
 EVERYTHING = {page: commands_of(page) for page in PAGES}
 WITH_COMMANDS = [page for page, found in EVERYTHING.items() if found]
-
-
-def parsed(command: str) -> click.Context | None:
-    """What the real parser makes of `sph …`; None for --help and --version."""
-    line = words(command.removeprefix(".venv/bin/"))[1:]
-    try:
-        if line[0].startswith("-"):
-            main.make_context("sph", line)
-        return main.commands[line[0]].make_context(f"sph {line[0]}", line[1:])
-    except click.exceptions.Exit:
-        return None
-
-
-def is_mention(block: Block, error: Exception) -> bool:
-    """Whether a command in a sentence lacks an argument, as `sph run --dry-run`."""
-    lacks = isinstance(error, (click.MissingParameter, click.BadOptionUsage))
-    return block.kind == "inline" and lacks
 
 
 def check_script(command: str, monkeypatch) -> None:
@@ -164,122 +136,16 @@ def test_every_exception_is_used():
     assert {*BEFORE, *GIVEN} <= names
 
 
-class Reader:
-    """Follows a page in the current directory."""
-
-    def __init__(self, page: Path, home: Path, monkeypatch):
-        self.page, self.home, self.monkeypatch = page, home, monkeypatch
-        shutil.copytree(ROOT / "configs", home / "configs")
-        for name, source in GIVEN.get(name_of(page), {}).items():
-            shutil.copy(ROOT / source, home / name)
-        (home / "bin").mkdir()
-        program = home / "bin" / "sph"
-        program.write_text(f'#!/bin/sh\nexec {sys.executable} -m sph "$@"\n')
-        program.chmod(0o755)
-        paths = {"PATH": f"{home / 'bin'}:{os.environ['PATH']}", "PYTHONPATH": f"{home}:{ROOT}"}
-        self.environment = os.environ | paths | {"HOME": str(home)}
-        monkeypatch.chdir(home)
-        monkeypatch.setattr(local, "run", self.one_by_one)
-        monkeypatch.setattr(task, "subprocess", SimpleNamespace(
-            Popen=self.point, DEVNULL=None, TimeoutExpired=subprocess.TimeoutExpired
-        ))  # fmt: skip
-
-    def follow(self) -> None:
-        for command in BEFORE.get(name_of(self.page), []):
-            self.run(command)
-        found = blocks(self.page)
-        for block, after in zip(found, [*found[1:], None], strict=True):
-            if block.name:
-                path = self.home / block.name
-                path.parent.mkdir(parents=True, exist_ok=True)
-                path.write_text(block.text)
-            for command in block.commands:
-                if is_left_out(command) or is_for_placeholders(command):
-                    continue
-                is_shown = after is not None and after.kind == "output"
-                said = self.run(command, block, is_short=not is_shown)
-                if is_shown:
-                    check_output(after, said)
-
-    def run(self, command: str, block: Block | None = None, is_short=True) -> str:
-        """Run a command; returns what it prints."""
-        first, *line = words(command.removeprefix(".venv/bin/"))
-        where = f"{block.place if block else self.page}: {command}"
-        if first != "sph":
-            return self.in_shell(command, where)
-        try:
-            context = parsed(command)
-        except click.UsageError as error:
-            assert is_mention(block, error), where
-            return ""
-        done = CliRunner().invoke(main, [*line, *(shortened(context) if is_short else [])])
-        assert done.exit_code == 0, f"{where}\n{done.output}"
-        return done.stdout
-
-    def in_shell(self, command: str, where: str) -> str:
-        """Run another program, or `sph` with variables of the shell."""
-        if "zsh_source" in command:  # another shell may not be there: its code is only printed
-            command = command.removeprefix('eval "$(').removesuffix(')"')
-        if "_SPH_COMPLETE=bash" in command:
-            command += " && complete -p sph"
-        for _, file in re.findall(r"> (~/)?(\S+)", command):
-            (self.home / file).parent.mkdir(parents=True, exist_ok=True)
-        command = re.sub(r"^python ", f"{sys.executable} ", command)
-        done = subprocess.run(
-            ["bash", "-c", command], env=self.environment, capture_output=True, text=True
-        )
-        assert done.returncode == 0, f"{where}\n{done.stdout}{done.stderr}"
-        assert ">" in command or "python" in command or "sph" in done.stdout, where
-        return done.stdout
-
-    def one_by_one(self, tasks, jobs, tell) -> None:
-        """The points of a sweep in this process, which has imported and compiled everything."""
-        for one in tasks:
-            tell(task.execute(one))
-
-    def point(self, command, stdout, **_):
-        """As subprocess.Popen."""
-        done = CliRunner().invoke(main, command[3:])
-        stdout.write(done.output.encode())
-        return SimpleNamespace(returncode=done.exit_code, wait=lambda _: done.exit_code)
-
-
-def shortened(context: click.Context | None) -> list[str]:
-    """Options that shorten the runs of a command."""
-    name = context.info_name.removeprefix("sph ") if context else ""
-    given = context.params if context else {}
-    if name not in ("run", "sweep", "stability") or given.get("dry_run"):
-        return []
-    varied = {one.partition("=")[0] for one in given.get("varies", ())}
-    resolved = configuration.load(given["config"], given["overrides"])
-    problem = resolved.problem
-    settings = {"time.end": PART * resolved.time.end}
-    if resolved.output.interval > settings["time.end"]:
-        settings["output.interval"] = settings["time.end"]
-    if problem.name != "file" and problem.n > FEW[problem.dimension]:
-        settings["problem.n"] = FEW[problem.dimension]
-    fewer = ["--limit", "resolution=2.0"] if name == "stability" else []
-    sets = [f"--set={key}={value!r}" for key, value in settings.items() if key not in varied]
-    return [*sets, *fewer]
-
-
-NUMBER = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:e[-+]?\d+)?")
-
-
-def check_output(shown: Block, said: str) -> None:
-    """Each line of the page is one of the output, up to "..."; numbers agree within 3 %.
-
-    The page rounds to two or three digits, and other processors round otherwise.
-    """
-    lines = said.splitlines()
-    for wanted in shown.text.splitlines():
-        begin = wanted.partition("...")[0]
-        start = NUMBER.split(begin)[0]
-        (line,) = [one for one in lines if one.startswith(start)]
-        numbers = [float(one) for one in NUMBER.findall(begin)]
-        assert NUMBER.sub("#", line).startswith(NUMBER.sub("#", begin)), shown.place
-        found = [float(one) for one in NUMBER.findall(line)][: len(numbers)]
-        assert found == pytest.approx(numbers, rel=0.03), shown.place
+@pytest.mark.parametrize(
+    "page", [page for page in WITH_COMMANDS if page.name == STUDIES], ids=name_of
+)
+def test_points_of_studies_are_valid(page, tmp_path, monkeypatch):
+    reader = Reader(tmp_path, monkeypatch)
+    monkeypatch.setattr(local, "run", lambda tasks, jobs, tell: None)
+    sweeps = [command for _, command in EVERYTHING[page] if command.startswith("sph sweep")]
+    assert sweeps
+    for command in sweeps:
+        assert "0 of " in reader.run(command, is_short=False)
 
 
 def is_slow(page: Path) -> bool:
@@ -306,4 +172,9 @@ def runs_commands(page: Path) -> bool:
     ],
 )
 def test_commands_run(page, tmp_path, monkeypatch):
-    Reader(page, tmp_path, monkeypatch).follow()
+    reader = Reader(tmp_path, monkeypatch)
+    for name, source in GIVEN.get(name_of(page), {}).items():
+        shutil.copy(ROOT / source, tmp_path / name)
+    for command in BEFORE.get(name_of(page), []):
+        reader.run(command)
+    reader.follow(page, lambda command: is_left_out(command) or is_for_placeholders(command))
