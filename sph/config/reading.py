@@ -95,9 +95,17 @@ def parse(text: str, name: str, directory: str = "") -> Source:
 def _syntax_message(message: str, text: str, name: str) -> str:
     found = re.fullmatch(r"(.*) \(at line (\d+), column (\d+)\)", message, re.DOTALL)
     if found:
-        return f"{name}, line {found[2]}, column {found[3]}: not valid TOML: {found[1]}"
+        line, column = int(found[2]), int(found[3])
+        rest = text.splitlines()[line - 1][column - 1 :] if line <= len(text.splitlines()) else ""
+        is_point = rest.startswith(".") or _POINT.match(rest)
+        hint = " (TOML needs digits on both sides of a point: 0.5)" if is_point else ""
+        return f"{name}, line {line}, column {column}: not valid TOML: {found[1]}{hint}"
     last = len(text.splitlines())
     return f"{name}, line {last}: not valid TOML: {message.removesuffix(' (at end of document)')}"
+
+
+# A number without a digit before or after its point, which TOML does not know.
+_POINT = re.compile(r"[+-]?(\.\d+|\d+\.)([eE][+-]?\d+)?(?![\w.])")
 
 
 def _value(text: str) -> Any:
@@ -105,7 +113,7 @@ def _value(text: str) -> Any:
     try:
         found = tomllib.loads(f"value = {text}")
     except (ValueError, RecursionError):
-        return text
+        return float(text) if _POINT.fullmatch(text.strip()) else text
     return found["value"] if list(found) == ["value"] else text
 
 

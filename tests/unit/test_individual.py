@@ -9,6 +9,7 @@ from sph.errors import NumericalError
 from sph.individual import Individual
 from sph.integrators import bins, leapfrog, limiter
 from sph.integrators.bins import TICKS
+from sph.part import Pass
 from sph.scene import Scene
 from sph.simulation import Simulation
 
@@ -62,6 +63,19 @@ def same_steps(monkeypatch):
         monkeypatch.setattr(Individual, "_choose", choose)
 
     return set_steps
+
+
+def test_passes_after_the_correction_run_for_particles_whose_step_ends(monkeypatch):
+    sizes = []
+
+    def note(mass):
+        sizes.append(mass.size)
+
+    after = Pass("correction", "rates", note, reads=("mass",))
+    monkeypatch.setattr(Scene, "last_passes", (after,))
+    one = simulation(BLAST, EACH)
+    one.advance(one.scene.config.time.end)
+    assert sum(sizes) == one.updates_here > 0
 
 
 @pytest.mark.parametrize("alpha", ["1.0", "{ min = 0.1, max = 2.0 }"])

@@ -34,6 +34,11 @@ class Material(NamedTuple):
         return self.strength is not None and self.strength.yields
 
 
+# Unsigned indices: Numba counts negative ones from the end of an array, so that with signed ones
+# LLVM compares the end of each array with the beginnings of others. For arrays that lie close
+# together in memory it then runs another version of the loop, which rounds differently.
+
+
 @njit(**COMPILED)
 def stresses(
     first, last, dim, models, neighbours, density, energy, support, velocity_gradient, div_v,
@@ -51,7 +56,7 @@ def stresses(
     D, lists, eos, strength = len(dim), neighbours.lists, models.eos, models.strength
     i_end = min(lists.first[last] * BLOCK, density.size)
     axes = empty((2, 3, 3), np.float64)  # scratch
-    for i in range(lists.first[first] * BLOCK, i_end):
+    for i in range(np.uint64(lists.first[first] * BLOCK), np.uint64(i_end)):
         if number is not None and number[i] != models.number:
             continue
         rho, u = density[i], energy[i]
@@ -97,7 +102,7 @@ def yielded(
     """
     lists = neighbours.lists
     i_end = min(lists.first[last] * BLOCK, energy.size)
-    for i in range(lists.first[first] * BLOCK, i_end):
+    for i in range(np.uint64(lists.first[first] * BLOCK), np.uint64(i_end)):
         if number is not None and number[i] != models.number:
             continue
         _return(

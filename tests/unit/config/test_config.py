@@ -268,6 +268,18 @@ def test_override_replaces_adds_and_merges(tmp_path):
     assert found.physics.kernel == {"name": "cubic_spline", "flattened": False}
 
 
+@pytest.mark.parametrize(("text", "value"), [(".25", 0.25), ("2.e-1", 0.2), ("+.5", 0.5)])
+def test_override_number_needs_no_digits_beside_its_point(text, value):
+    found = default(f"physics.C={text}").physics.C
+    assert found == value
+
+
+@pytest.mark.parametrize("text", [".25", "-.5", "2.", "[1., 2.]"])
+def test_number_without_digits_beside_its_point_is_explained(text):
+    with pytest.raises(ConfigError, match=r"digits on both sides of a point: 0\.5"):
+        config.from_text(f"{MINIMAL}[physics]\nC = {text}\n")
+
+
 def test_override_repeated_last_one_wins():
     assert default("time.end=1", "time.end=2").time.end == 2.0
 
