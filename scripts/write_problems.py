@@ -26,7 +26,6 @@ sources. `sph list` prints the first column.
 """
 PICTURES = {
     "shock_tube": ("sod.png", "Sod's shock tube and the exact solution"),
-    "kelvin_helmholtz": ("kh_growth.png", "Growth of the instability"),
     "kelvin_helmholtz_smooth": ("shear_layer.png", "Billows of a shear layer"),
     "point_explosion": ("blast.png", "Dense shell of a blast wave"),
 }

@@ -85,6 +85,11 @@ def test_python_is_python():
             ast.parse(f"({{{block.text}}})" if is_entry else block.text, block.place)
 
 
+def test_code_holds_no_links():
+    code = [block for block in EVERYTHING if block.kind in ("sh", "output", "other")]
+    assert not [block.place for block in code if re.search(r"\]\(\w+\.md", block.text)]
+
+
 def paragraphs_of(page: str) -> list[str]:
     """The pieces of Python of a page that a blank line ends, without those that create files."""
     found = [one for one in PYTHON if page_of(one) == page and not one.name]
