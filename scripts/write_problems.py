@@ -69,8 +69,11 @@ def _about(name: str) -> tuple[str, str]:
 
 
 def _picture(name: str) -> str:
-    file, shown = PICTURES.get(name, ("", ""))
-    return f"![{shown}](../images/{file})" if file else ""
+    """Return a picture: one with a caption of its own, or one of scripts/problem_pictures.py."""
+    own = (f"problems/{name}.png", f"The run of configs/{name}.toml")
+    file, shown = PICTURES.get(name, own)
+    exists = (ROOT / "docs" / "images" / file).exists()
+    return f"![{shown}](../images/{file})" if exists else ""
 
 
 def _commands(name: str) -> str:
