@@ -2,6 +2,7 @@
 
 import re
 import shlex
+import subprocess
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -20,7 +21,7 @@ BLOCK = re.compile(
 FILE = r"`([\w./-]+\.(?:toml|py))`"
 NAMED = re.compile(rf"Create {FILE}|{FILE}(?: beside it)?:")
 FIRST_WORDS = ("sph", "python", "python3", "pip", "dask", "eval", "source", "git", "mkdocs",
-               "ruff", "lint-imports", "mypy", "pre-commit", "grep")  # fmt: skip
+               "ruff", "lint-imports", "mypy", "pre-commit", "grep", "for")  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -46,7 +47,10 @@ class Block:
         """The commands, without comments and without what a list says beside them."""
         if self.kind == "inline":
             return [self.text] if _is_command(self.text) else []
-        lines = self.text.splitlines() if self.kind == "sh" else []
+        if self.kind != "sh":
+            return []
+        is_loop = self.text.startswith("for ")
+        lines = (_of_loop(self.text) if is_loop else self.text).splitlines()
         plain = (re.split(r" {2,}", one.strip())[0] for one in lines)
         parts = (part.strip() for one in plain for part in one.split("&&"))
         return [part for part in parts if part]
@@ -68,6 +72,14 @@ def blocks(page: Path) -> list[Block]:
         kind = _kind(match["info"] or "", body, found)
         found.append(Block(page, line, kind, body, name))
     return found
+
+
+def _of_loop(script: str) -> str:
+    """The commands `sph …` of a loop of the shell, with the values of its variables."""
+    shown = 'sph() { printf "%q " sph "$@"; echo; }\n'
+    return subprocess.run(
+        ["bash", "-c", shown + script], check=True, capture_output=True, text=True
+    ).stdout
 
 
 def words(command: str) -> list[str]:
