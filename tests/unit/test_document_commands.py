@@ -149,7 +149,7 @@ def sweeps_that_do_not_run(page: Path) -> list[str]:
     return [one for one in sweeps if page.name == STUDIES or one.startswith(listed)]
 
 
-@pytest.mark.parametrize("page", filter(sweeps_that_do_not_run, WITH_COMMANDS), ids=name_of)
+@pytest.mark.parametrize("page", list(filter(sweeps_that_do_not_run, WITH_COMMANDS)), ids=name_of)
 def test_points_of_sweeps_that_do_not_run_are_valid(page, tmp_path, monkeypatch):
     reader = Reader(tmp_path, monkeypatch)
     monkeypatch.setattr(local, "run", lambda tasks, jobs, tell: None)
