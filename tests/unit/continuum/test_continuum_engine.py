@@ -235,7 +235,7 @@ def run_engine(case, matter, skin, threads, lanes=simd.DOUBLE):
     assert not search.stale(matter.position, matter.listed)
     given = initial_state(case, matter)
     scene = scene_of(case, given, 1.0)
-    state = State.at_start(scene.fields, *given)
+    state = State.at_start(scene.fields, *given.particles)
     scene.formulation.start(state)  # the initial lengths
     state.density[:] = state.predicted_density[:] = matter.density
     state.predicted_velocity[:] = matter.velocity
