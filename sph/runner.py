@@ -41,6 +41,8 @@ def run(config: Config, directory: RunDirectory, progress) -> dict:
         directory.withdrawn_unless_begun(),
     ):
         progress.note("preparing the initial state")
+        for remark in config.problem.remarks():
+            progress.note(remark)
         with closing(Simulation.of_problem(Scene(config), threads_of(config), clock)) as simulation:
             directory.make_room()
             directory.write_config(config.to_toml())

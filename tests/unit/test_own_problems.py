@@ -359,6 +359,7 @@ ARGUMENTS = {
     "undisturbed": "eos, time",
     "error_region": "eos, time, position",
     "departs": "physics",
+    "remarks": "",
     "theory": "eos, times",
     "over_time": "eos, history",
 }
@@ -384,6 +385,7 @@ LATE = [
     ("undisturbed", "[0.0, 1.0]", "undisturbed returned an array of the shape (2,); expected (D, "),
     ("error_region", "position[0] > 0", "expected a mask of the shape (N,) = (3,) and a text"),
     ("error_region", "(position > 0, '')", "expected a mask of the shape (N,) = (3,) and a text"),
+    ("remarks", "'two clouds'", "remarks returned 'two clouds'; expected a list of texts"),
     ("departs", "True", "departs returned True; expected a text"),
     ("theory", "{'t': 1.0}", "theory returned t of the shape (); expected numbers of the shape"),
     ("report", "1.0", "report returned 1.0; expected a dictionary"),

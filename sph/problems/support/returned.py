@@ -128,6 +128,12 @@ def _fault_of_numbers(problem, found: Any, *_, **__) -> str:
     return ""
 
 
+def _fault_of_texts(problem, found: Any, *_, **__) -> str:
+    if isinstance(found, list) and all(isinstance(one, str) for one in found):
+        return ""
+    return f"{_words(found)}; expected a list of texts"
+
+
 def _fault_of_columns(problem, found: Any, *_, **__) -> str:
     """Columns of the history, whose names are the first line of a CSV file."""
     fault = _fault_of_numbers(problem, found)
@@ -147,6 +153,7 @@ CHECKS: dict[str, Callable[..., str]] = {
     "undisturbed": _fault_of_range,
     "error_region": _fault_of_region,
     "departs": _fault_of_reason,
+    "remarks": _fault_of_texts,
     "theory": _fault_of_theory,
     "diagnostics": _fault_of_columns,
     "report": _fault_of_numbers,
