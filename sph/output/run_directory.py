@@ -1,6 +1,5 @@
 """The run directory: the paths of its files, and which of them may be replaced."""
 
-import fcntl
 import json
 import os
 import re
@@ -13,12 +12,11 @@ from pathlib import Path
 import numpy as np
 
 from sph.errors import FileError, NumericalError
-from sph.output import checkpoint, history, same_run
+from sph.output import checkpoint, history, locks, same_run
 from sph.output.checkpoint import Checkpoint
 from sph.output.files import (
     Damaged,
     explained,
-    holding,
     is_same_path,
     is_unfinished,
     opened,
@@ -265,47 +263,16 @@ class RunDirectory:
 
     def is_running(self) -> bool | None:
         """Return whether a process has locked the directory; None on file systems without locks."""
-        try:
-            descriptor = os.open(self._checkpoint_directory, os.O_RDONLY | os.O_DIRECTORY)
-        except OSError:  # moved or removed
-            return False
-        try:
-            fcntl.flock(descriptor, fcntl.LOCK_SH | fcntl.LOCK_NB)
-        except BlockingIOError:
-            return True
-        except OSError:
-            return None
-        else:
-            return False
-        finally:
-            os.close(descriptor)
+        return locks.is_held(self._checkpoint_directory)
 
     @contextmanager
     def alone(self) -> Iterator[None]:
         """Lock the directory within the block. Raises FileError if another process has locked it.
 
-        Files are written to the locked directory even if another one takes its place. On file
-        systems without locks, nothing is locked.
+        Files are written to the locked directory even if another one takes its place.
         """
-        with explained(f"cannot open {self.path}"):
-            flags = os.O_RDONLY | os.O_DIRECTORY
-            home = os.open(self.path, flags)
-            descriptor = os.open("checkpoints", flags | os.O_NOFOLLOW, dir_fd=home)
-        try:
-            try:
-                fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            except BlockingIOError:
-                raise FileError(
-                    f"{self.path} is in use by another run of sph.\n"
-                    "Try: wait until that run has ended, or another directory, with -o."
-                ) from None
-            except OSError:
-                pass  # this file system has no locks
-            with holding({self.path: home, self._checkpoint_directory: descriptor}):
-                yield
-        finally:
-            os.close(descriptor)
-            os.close(home)
+        with locks.held(self.path, self._checkpoint_directory):
+            yield
 
     def _refuse_begun(self) -> None:
         if self.checkpoints() or (self.history.exists() and not self._ended_at_once()):
