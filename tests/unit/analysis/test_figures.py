@@ -141,7 +141,9 @@ def test_run_of_every_problem_is_drawn(tmp_path, problem):
 
 
 def test_own_shapes_in_space_have_no_profiles_over_x(tmp_path):
-    shape = '{shape = "sphere", centre = [0.5, 0.5, 0.5], radius = 0.4, density = 1.0}'
+    shape = (
+        '{shape = "sphere", centre = [0.5, 0.5, 0.5], radius = 0.4, density = 1.0, pressure = 1.0}'
+    )
     keys = ("problem.dimension=3", f"problem.region=[{shape}]", 'problem.boundary="open"')
     run = write_run(tmp_path / "ball", [state_of("regions", *keys, time=t) for t in (0.0, 0.1)])
     assert {path.stem for path in figures.draw([run.path])} == {"slice", "evolution", "history"}
@@ -843,6 +845,14 @@ def test_history_figure_names_constants_in_place_of_flat_panels(shear):
     )
     found["held_supports"] = np.array([0.0, 1.0])
     assert "held supports" in [panel.get_ylabel() for panel in history.figure(found, "a").axes]
+
+
+def test_history_figure_draws_small_change_of_diagnostic(shear):
+    found = read_history(shear.history)
+    found["volume_ratio"] = np.array([0.9938, 0.9941])
+    panel = history.figure(found, "a run").axes[-1]
+    assert panel.get_ylabel().endswith("\nless 0.9938")
+    assert lines(panel)[0][1] == pytest.approx([0.0, 0.0003])
 
 
 def test_history_legends_cover_no_data(shear):

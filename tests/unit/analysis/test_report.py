@@ -589,6 +589,9 @@ def test_pictures_show_every_run(study):
         inside = (report.cost >= start) & (report.cost <= end)
         assert inside.any()
         assert (level > np.log(report.error))[inside].all()  # no line crosses a curve
+    at = report.cost.max()
+    first, second = (line.get_ydata()[-1] for line in guides if line.get_xdata()[-1] == at)
+    assert second >= first * (1.0 - ROUND_OFF)  # the steeper line crosses the other nowhere
     panel = pictures.error_against_number(report).axes[0]
     assert any(line.get_label() == r"$\alpha$ = 1.0: order 1.00" for line in panel.lines)
     bars = pictures.phases(report).axes[0].containers
