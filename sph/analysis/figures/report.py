@@ -202,10 +202,10 @@ def _guides(panel, x: np.ndarray, error: np.ndarray, slopes: dict[int, float]) -
         if start >= end:
             continue
         panel.plot([start, end], level * np.array([start, end]) ** slope, ":", color=GUIDE, lw=1)
-        # beside the end where the lines are farthest from each other
+        # at the end where the lines are farthest from each other
         panel.annotate(
-            f"order {p}", (start, level * start**slope), color=GUIDE, fontsize=9, xytext=(-3, 0),
-            textcoords="offset points", ha="right", va="center",
+            f"order {p}", (start, level * start**slope), color=GUIDE, fontsize=9, xytext=(4, 1),
+            textcoords="offset points",
         )  # fmt: skip
 
 

@@ -674,3 +674,14 @@ def test_picture_labels_are_short():
     )
     assert labels.value_alone("scheme = grad_h") == "grad_h"
     assert labels.value_alone("eta = 1.6") == "eta = 1.6"
+
+
+@pytest.mark.parametrize(
+    ("value", "text"),
+    [(300.0, "300"), (1e-4, "$10^{-4}$"), (1.5e-4, r"$1.5\times 10^{-4}$"),
+     (2e-4, r"$2\times 10^{-4}$")],
+)  # fmt: skip
+def test_ticks_of_one_decade_differ(value, text):
+    from sph.analysis.figures.report_labels import tick
+
+    assert tick(value) == text
