@@ -91,7 +91,7 @@ class Continuum(Formulation):
         ),
     )  # fmt: skip
     reserves = (
-        "pressure", "stress", "deviatoric_stress", "stress_rate", "predicted_stress",
+        "pressure", "stress", "deviatoric_stress",
         "plastic_strain", "material", "clamped", "balsara", "kernel_factor", "kernel_gradient",
         "kernel_matrix", "tension", "initial_support", "body",
     )  # fmt: skip

@@ -52,8 +52,8 @@ SINGULAR = 1e6
 
 @njit(**COMPILED)
 def gradients(
-    first, last, dim, models, neighbours, position, velocity, mass, density, support,
-    kernel_factor, kernel_gradient, kernel_matrix, velocity_gradient, div_v, density_rate,
+    first, last, dim, models, neighbours, position, velocity, mass, density, support, before,
+    kernel_factor, kernel_gradient, kernel_matrix, velocity_gradient, div_v, density_rate, dt,
 ):  # fmt: skip
     """Gradient pass over superblocks [first, last): eqs 402-407.
 
@@ -141,13 +141,15 @@ def gradients(
                             for b in range(D):
                                 identity = alpha if a == b else 0.0
                                 kernel_matrix[a, b, i] = B[a, b] if is_regular else identity
-                divergence = 0.0
+                _fill_product(M, L)
+                divergence, back = 0.0, 0.5 * dt / per_rate
                 for a in range(D):
-                    divergence += L[a, a]
                     for b in range(D):
-                        velocity_gradient[a, b, i] = L[a, b] / per_rate
-                div_v[i] = divergence / per_rate
-                density_rate[i] = -density[i] * (divergence / per_rate)  # eq 407
+                        velocity_gradient[a, b, i] = (L[a, b] + back * M[a, b]) / per_rate
+                    divergence += velocity_gradient[a, a, i]
+                div_v[i] = divergence
+                growth = np.expm1(-divergence * dt) / dt if dt > 0.0 else -divergence
+                density_rate[i] = before[i] * growth  # eq 407
 
 
 # --- small matrices (D, D) ---
@@ -188,6 +190,17 @@ def _times_matrix(M, B, L):
             for c in range(D):
                 total += M[a, c] * B[c, b]
             L[a, b] = -total
+
+
+@njit(**INLINED)
+def _fill_product(matrix, L):
+    """Set a matrix to L L."""
+    D = L.shape[0]
+    for a in range(D):
+        for b in range(D):
+            matrix[a, b] = 0.0
+            for c in range(D):
+                matrix[a, b] += L[a, c] * L[c, b]
 
 
 @njit(**INLINED)
