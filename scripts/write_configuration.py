@@ -19,7 +19,8 @@ Every key with its meaning, bounds and default, as `sph new PROBLEM` prints it. 
 A configuration is checked strictly: an unknown key, a wrong type and a value out of bounds are
 errors. The messages give file, line and the nearest valid name, and `sph` reports all errors
 together. A key that is not given has its default. A problem may have its own defaults for keys of
-other tables. `--set TABLE.KEY=VALUE` sets a key from the command line.
+other tables. `--set TABLE.KEY=VALUE` sets a key from the command line. `--set TABLE.KEY=none`
+leaves out a key that has no default.
 
 In place of `problem.name`, `problem.file` names a Python file with a problem of your own
 ([own_problem.md](own_problem.md)); `sph new FILE.py` prints its keys.

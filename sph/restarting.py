@@ -248,7 +248,7 @@ def _place_to_go_on(
     for earlier in home.checkpoints():
         if checkpoint_number(earlier) <= number:
             copy_file(earlier, target.checkpoint_path(checkpoint_number(earlier)))
-    for path in (home.history, home.problem):
+    for path in (home.history, home.problem, home.relaxation):
         if path.exists():
             copy_file(path, target.path / path.name)
     return target, number

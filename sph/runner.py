@@ -22,7 +22,7 @@ from sph.output.history import read as read_history
 from sph.output.run_directory import RunDirectory
 from sph.scene import Scene
 from sph.shell_words import quoted
-from sph.simulation import Simulation
+from sph.simulation import PLACING, Simulation
 from sph.steps import MOST
 from sph.stop_signals import stop_signals
 from sph.threads import available_processors
@@ -43,6 +43,9 @@ def run(config: Config, directory: RunDirectory, progress) -> dict:
         directory.write_config(config.to_toml())
         if source := getattr(config.problem, "source", b""):
             directory.write_problem(source)
+        if ended := simulation.relaxation:
+            spent = round(clock.seconds[PLACING], 4)
+            directory.write_relaxation({**ended._asdict(), "cpu_seconds": spent})
         try:
             simulation.begin()
         except NumericalError as error:
@@ -275,6 +278,7 @@ class Runner:
             status=status,
             reason=reason,
             lineage=self.lineage,
+            relaxation=self.directory.read_relaxation(),
         )
         self.directory.write_summary(result)
         named = self.config.report.reference

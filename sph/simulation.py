@@ -12,6 +12,7 @@ from sph.neighbours.order import number_of_blocks
 from sph.neighbours.search import Origin, Search
 from sph.part import Pass
 from sph.passes import nearest
+from sph.problems.base import Relaxation
 from sph.scene import Scene
 from sph.state import State
 from sph.steps import Steps, rows
@@ -21,6 +22,8 @@ from sph.watchdog import Watchdog
 # Each widening extends lists at least to the requested radius. A request is at most twice the
 # radius of the last one.
 MAX_WIDENINGS = 60
+
+PLACING = "initial state"  # the phase in which the problem makes its particles, or relaxes them
 
 
 class Simulation:
@@ -53,6 +56,7 @@ class Simulation:
         self.energy_drift = 0.0
         self.energy_added = 0.0  # by sources such as heating, since the start of the run
         self.energy_injected = 0.0  # to keep internal energies positive, since the start
+        self.relaxation: Relaxation | None = None  # before the start; unknown after a restart
         self.watchdog = Watchdog(scene)
         missing = particles.declare(scene.fields)
         for part in scene.all_parts:
@@ -82,11 +86,14 @@ class Simulation:
     @classmethod
     def of_problem(cls, scene: Scene, threads: int, clock: Clock) -> "Simulation":
         """Return a simulation with the problem's initial state, before `begin`."""
-        with clock.phase("initial state"):
-            particles = State.at_start(scene.fields, *scene.initial_state())
+        with clock.phase(PLACING):
+            start = scene.initial_state()
+            particles = State.at_start(scene.fields, *start.particles)
             for part in scene.all_parts:
                 part.start(particles)
-        return cls(scene, particles, threads, clock)
+        self = cls(scene, particles, threads, clock)
+        self.relaxation = start.relaxation
+        return self
 
     def begin(self) -> None:
         """Compute converged supports, rates, and the first step size. Raises NumericalError."""

@@ -121,6 +121,30 @@ class Tearing(TypedDict):
     pieces: Annotated[int, Quantity("number of their connected pieces at the end, eq 454")]
 
 
+class Relaxation(TypedDict):
+    """How relaxation of the particles to a glass ended, before the first step (eqs 460-463)."""
+
+    iterations: Annotated[int, Quantity("number of iterations")]
+    density_error: Annotated[
+        float,
+        Quantity("rms scatter of the density sums about their mean, over that mean, eq 461"),
+    ]
+    mean_offset: Annotated[
+        float,
+        Quantity(
+            "mean of the density sums over the density of the problem, minus 1: an error of the "
+            "kernel sum, which lattices have as well"
+        ),
+    ]
+    cpu_seconds: Annotated[
+        float,
+        Quantity(
+            "CPU time of placing and relaxing the particles, a part of cost.cpu_seconds",
+            quantity.CPU_SECONDS,
+        ),
+    ]
+
+
 class Session(TypedDict):
     """Cost of the last session, that is of one call of `sph run` or `sph restart`."""
 
@@ -204,6 +228,9 @@ class Summary(TypedDict):
     # not without solid bodies, nor where the run failed
     tearing: NotRequired[
         Annotated[Tearing, Quantity("pieces of solid bodies; only of runs with solids")]
+    ]
+    relaxation: NotRequired[
+        Annotated[Relaxation, Quantity("relaxation to a glass; only of runs that begin from one")]
     ]
     cost: Annotated[Cost, Quantity("cost of all sessions, and of the last one")]
     compiled_in: Annotated[list[str], Quantity("physics that the run computed")]

@@ -8,19 +8,20 @@ import numpy as np
 from sph import warnings
 from sph.analysis import errors, truth
 from sph.config import restarts
-from sph.summary import Conservation, Cost, Status, Summary
+from sph.summary import Conservation, Cost, Relaxation, Status, Summary
 from sph.totals import Baseline
 from sph.version import __version__
 
 
 def of_run(
     simulation, history: dict[str, np.ndarray], status: Status, reason: str | None,
-    lineage: tuple[str, ...] = (),
+    lineage: tuple[str, ...] = (), relaxation: Relaxation | None = None,
 ) -> Summary:  # fmt: skip
     """The summary, from the simulation's last state and the whole history.
 
     status: "done", "stopped" or "failed"; the last two with the reason. Errors are against the
     exact solution; where the configuration names a reference, `reference.errors_against` has them.
+    relaxation: how relaxation to a glass ended, if the run began from one.
     """
     scene, particles = simulation.scene, simulation.particles
     inside, outside = scene.described()
@@ -45,6 +46,8 @@ def of_run(
         "compiled_in": inside,
         "left_out": outside,
     }
+    if relaxation is not None:
+        result["relaxation"] = relaxation
     if status == "failed":
         result["errors_left_out"] = "the run failed"
     else:
@@ -179,6 +182,7 @@ def in_words(summary: Summary) -> str:
             for name, value in (summary["report"] or {}).items()
         ),
         _kept_in_words(summary["conservation"]),
+        *_relaxation_in_words(summary),
         _cost_in_words(summary["cost"]),
     ]
     return "\n".join(lines)
@@ -221,6 +225,16 @@ def _kept_in_words(kept: Conservation) -> str:
     if ratio is not None:
         parts.append(f"at the end sum m/rho is {ratio:.4g} of the volume")
     return f"Conserved, at worst over the run: {'; '.join(parts)}."
+
+
+def _relaxation_in_words(summary: Summary) -> list[str]:
+    if not (ended := summary.get("relaxation")):
+        return []
+    return [
+        f"Glass, after {ended['iterations']} iterations: density error {ended['density_error']:.2g}"
+        f" rms about a mean offset of {ended['mean_offset']:+.2g}; {ended['cpu_seconds']:.3g} CPU "
+        "s, which the cost includes."
+    ]
 
 
 def _cost_in_words(cost: Cost) -> str:

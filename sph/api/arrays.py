@@ -189,5 +189,5 @@ def _state(
     for name, values in arrays.items():
         if values.ndim == 0:
             arrays[name] = np.full(shape if name == "velocity" else shape[1], values)
-    main = {name: arrays[name] for name in returned.STATE}
-    return base.InitialState(**main, others={name: arrays[name] for name in others})
+    position, velocity, mass, energy = (arrays[name] for name in returned.STATE)
+    return base.InitialState(position, velocity, mass, energy, {n: arrays[n] for n in others})

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from pydantic import BaseModel
 
-from sph.config import commented, outside, reading
+from sph.config import commented, outside, reading, removal
 from sph.config.errors import dotted, suggestion
 from sph.config.physics import Physics
 from sph.config.sections import RESOURCES, SECTIONS, Output, Report, Run, Time
@@ -89,10 +89,17 @@ def from_tables(
 
 
 def as_overrides(overrides: Sequence[str] | Mapping[str, Any]) -> list[str]:
-    """Return overrides `a.b=VALUE` of a mapping {"a.b": VALUE}, or those given."""
+    """Return overrides `a.b=VALUE` of a mapping {"a.b": VALUE}, or those given.
+
+    None removes a key.
+    """
     if not isinstance(overrides, Mapping):
         return [overrides] if isinstance(overrides, str) else list(overrides)
-    return [f"{key}={value_text(_plain(one, (key,)))}" for key, one in overrides.items()]
+    texts = {
+        key: removal.NONE if one is None else value_text(_plain(one, (key,)))
+        for key, one in overrides.items()
+    }
+    return [f"{key}={text}" for key, text in texts.items()]
 
 
 def _plain(value: Any, path: KeyPath = ()) -> Any:

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 from pydantic import ValidationError
 from pydantic_core import ErrorDetails
 
-from sph.config import checks, outside, physics, problem_choice
+from sph.config import checks, outside, physics, problem_choice, removal
 from sph.config.errors import (
     Issue,
     dotted,
@@ -117,8 +117,11 @@ def _value(text: str) -> Any:
     return found["value"] if list(found) == ["value"] else text
 
 
-def _set(source: Source, override: str) -> None:
-    """Set one override `a.b=VALUE` in the source. Raises ConfigError if its form is wrong."""
+def _set(source: Source, override: str) -> Path:
+    """Set one override `a.b=VALUE` in the source, and return its path.
+
+    VALUE = none removes the key. Raises ConfigError if the form is wrong.
+    """
     name, equals, text = override.partition("=")
     path = tuple(step.strip() for step in name.split("."))
     if not equals or not all(path):
@@ -132,12 +135,16 @@ def _set(source: Source, override: str) -> None:
         if not isinstance(table.get(step), dict):
             table[step] = {}
         table = table[step]
-    table[path[-1]] = _value(text)
-    for other in _IN_PLACE_OF.get(dotted(path[:2]), ()):
-        source.tables[path[0]].pop(other, None)
+    if text.strip() == removal.NONE:
+        table.pop(path[-1], None)
+    else:
+        table[path[-1]] = _value(text)
+        for other in _IN_PLACE_OF.get(dotted(path[:2]), ()):
+            source.tables[path[0]].pop(other, None)
     for old in [old for old in source.places if old[: len(path)] == path]:
         del source.places[old]
     source.places[path] = f"--set {override}"
+    return path
 
 
 # --- validation -------------------------------------------------------------------------------
@@ -156,8 +163,7 @@ def resolve(
     a new run with its settings would be refused. problem: class of the problem, if not chosen by
     [problem].
     """
-    for override in overrides:
-        _set(source, override)
+    paths = [_set(source, override) for override in overrides]
     models: dict[str, type[Section]] = {
         "problem": Problem, "physics": physics.table(physics.DEFAULT), **sections
     }  # fmt: skip
@@ -173,6 +179,7 @@ def resolve(
             "formulation", problem.defaults.get("physics.formulation", physics.DEFAULT)
         )
         models["physics"] = physics.chosen(raw["physics"])
+        issues += removal.issues(paths, source.tables, problem, models)
         _fill_defaults(raw, problem, models)
         _fill_tables(raw["problem"], source, problem)
         _make_paths_absolute(raw["problem"], source, problem)

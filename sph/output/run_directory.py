@@ -104,6 +104,11 @@ class RunDirectory:
         return self.path / "problem.py"
 
     @property
+    def relaxation(self) -> Path:
+        """Path of how relaxation to a glass ended; summaries of later restarts contain it too."""
+        return self.path / "relaxation.json"
+
+    @property
     def offenders(self) -> Path:
         """Path of the file in which a failed run stores the particles at which it failed."""
         return self.path / "offenders.h5"
@@ -208,6 +213,14 @@ class RunDirectory:
         with replacing(self.problem) as unfinished:
             unfinished.write(source)
 
+    def write_relaxation(self, ended: Mapping) -> None:
+        """Write how relaxation to a glass ended, atomically. Raises FileError."""
+        write_text(self.relaxation, json_text(ended))
+
+    def read_relaxation(self) -> dict | None:
+        """Return how relaxation ended; None without relaxation, or if the file cannot be read."""
+        return _json_object(self.relaxation) or None
+
     def write_summary(self, summary: Mapping) -> None:
         """Write summary.json atomically, with non-finite numbers as "nan", "inf" and "-inf".
 
@@ -233,11 +246,7 @@ class RunDirectory:
 
         For the status of a run that may not have ended; `whole_summary` has the figures.
         """
-        try:
-            found = json.loads(read_text(self.summary))
-        except (OSError, FileError, ValueError, RecursionError):
-            return {}
-        return found if isinstance(found, dict) else {}
+        return _json_object(self.summary)
 
     @contextmanager
     def alone(self) -> Iterator[None]:
@@ -275,7 +284,8 @@ class RunDirectory:
             )
         if self.figures.is_dir() and not self.figures.is_symlink():
             shutil.rmtree(self.figures)
-        for path in (self.history, self.summary, self.offenders, self.problem, *self.checkpoints()):
+        files = (self.history, self.summary, self.offenders, self.problem, self.relaxation)
+        for path in (*files, *self.checkpoints()):
             path.unlink(missing_ok=True)
         self.write_config("")  # keeps MARK, so that this remains a run directory
 
@@ -289,6 +299,15 @@ class RunDirectory:
     def _remove_unfinished(self) -> None:
         for directory in (self.path, self._checkpoint_directory):
             remove_unfinished(directory)
+
+
+def _json_object(path: Path) -> dict:
+    """Return the JSON object in a file, empty if there is none or it cannot be read."""
+    try:
+        found = json.loads(read_text(path))
+    except (OSError, FileError, ValueError, RecursionError):
+        return {}
+    return found if isinstance(found, dict) else {}
 
 
 def checkpoint_number(path: Path) -> int | None:

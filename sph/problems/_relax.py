@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from contextlib import closing
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from pydantic import Field, PrivateAttr, model_validator
@@ -29,6 +29,13 @@ class Relax(base.Section):
     seed: int = Field(default=0, ge=0, description="seed of the random positions at the start")
 
 
+class Placed(NamedTuple):
+    """Positions (D, N), and how relaxation ended; None without relaxation."""
+
+    position: np.ndarray
+    relaxation: base.Relaxation | None
+
+
 class Relaxable(base.Problem):
     """A problem whose particles can begin on a glass instead of a lattice."""
 
@@ -53,16 +60,16 @@ class Relaxable(base.Problem):
         copy._sums = _smoothing(physics, self.dimension)
         return copy
 
-    def on_glass(self, position: np.ndarray) -> np.ndarray:
+    def on_glass(self, position: np.ndarray) -> Placed:
         """Return the positions (D, N) of a lattice with equal volumes, relaxed if that is asked."""
         if self.relax is None:
-            return position
+            return Placed(position, None)
         start = lattice.with_noise(position, self.box, 0.5, self.relax.seed)
         each = float(np.prod(self.box[:, 1] - self.box[:, 0])) / position.shape[1]
         return self.relaxed(start, lambda x: np.full(x.shape[1], each))
 
-    def relaxed(self, start: np.ndarray, volume: Callable[[np.ndarray], np.ndarray]) -> np.ndarray:
-        """Return relaxed positions (D, N).
+    def relaxed(self, start: np.ndarray, volume: Callable[[np.ndarray], np.ndarray]) -> Placed:
+        """Return relaxed positions (D, N), and how relaxation ended.
 
         volume: returns the volumes (N,) of particles at positions (D, N). Raises ConfigError if the
         residual is not reached.
@@ -92,7 +99,7 @@ def _relaxed(
     domain: Domain,
     volume: Callable[[np.ndarray], np.ndarray],
     sums: glass.Smoothing,
-) -> np.ndarray:
+) -> Placed:
     """Return relaxed positions (D, N), see `Relaxable.relaxed`."""
     with closing(progress.suited_to_iterations("relaxing", keys.iterations)) as shown:
         found = glass.relaxed(
@@ -108,4 +115,5 @@ def _relaxed(
             f"relaxed {position.shape[1]} particles in {found.iterations} iterations: density "
             f"error {found.scatter:.2e} rms about a mean of {found.mean - 1.0:+.2e}"
         )
-    return found.position
+    ended = base.Relaxation(found.iterations, found.scatter, found.mean - 1.0)
+    return Placed(found.position, ended)

@@ -14,6 +14,14 @@ from sph.quantity import Quantity
 Boundary = Literal["periodic", "mirror", "open"]
 
 
+class Relaxation(NamedTuple):
+    """How relaxation to a glass ended (eqs 460 and 461)."""
+
+    iterations: int
+    density_error: float  # rms scatter of the density sums about their mean, over that mean
+    mean_offset: float  # mean of the density sums over the density of the scene, minus 1
+
+
 class InitialState(NamedTuple):
     """Particles at t = 0, code units."""
 
@@ -24,6 +32,12 @@ class InitialState(NamedTuple):
     # initial values of further fields, (N,) each, such as the density; ignored where a scene has no
     # field of that name
     others: Mapping[str, np.ndarray] = MappingProxyType({})
+    relaxation: Relaxation | None = None  # of particles that were relaxed to a glass
+
+    @property
+    def particles(self) -> tuple:
+        """What `State.at_start` takes."""
+        return self[:5]
 
 
 class Limit(NamedTuple):

@@ -85,11 +85,13 @@ class Problem(_relax.Relaxable):
         return np.array(self.velocity)
 
     def initial(self, eos) -> base.InitialState:
-        position = self.on_glass(placement.fill(self.box, self.n, self.lattice))
+        position, relaxation = self.on_glass(placement.fill(self.box, self.n, self.lattice))
         n = position.shape[1]
         state = self.exact(eos, 0.0, position)
         mass = np.full(n, DENSITY * np.prod(self.box[:, 1] - self.box[:, 0]) / n)
-        return base.InitialState(position, state["velocity"], mass, state["internal_energy"])
+        return base.InitialState(
+            position, state["velocity"], mass, state["internal_energy"], relaxation=relaxation
+        )
 
     def exact(self, eos, time: float, position: np.ndarray) -> dict[str, np.ndarray]:
         """Return the initial vortex, moved with the uniform velocity, at (D, N) positions."""

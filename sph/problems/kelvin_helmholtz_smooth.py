@@ -61,6 +61,7 @@ class Problem(_relax.Relaxable):
             "growth rate of linear theory over the same times", units.RATE
         ),
         "growth_ratio": Quantity("growth_rate over linear_growth_rate"),
+        "growth_error": Quantity("|growth_ratio - 1|, the relative error of the growth rate"),
     }
     title: ClassVar = "Kelvin-Helmholtz instability, smooth layer"
 
@@ -74,13 +75,14 @@ class Problem(_relax.Relaxable):
 
     def initial(self, eos) -> base.InitialState:
         """Return a cubic lattice, or a glass, whose masses follow the density."""
-        position = self.on_glass(fill(self.box, self.n, "cubic"))
+        position, relaxation = self.on_glass(fill(self.box, self.n, "cubic"))
         x, y = position
         density = _ramped(*DENSITY, y)
         velocity = np.stack([_ramped(*SPEED, y), PERTURBATION * np.sin(2 * np.pi * x / WAVELENGTH)])
         mass = density / y.size  # the box has volume 1
         energy = eos.internal_energy(density, np.full(y.size, PRESSURE))
-        return base.InitialState(position, velocity, mass, energy, {"density": density})
+        others = {"density": density}
+        return base.InitialState(position, velocity, mass, energy, others, relaxation)
 
     def diagnostics(self, particles) -> dict[str, float]:
         x, y = particles.position
@@ -106,7 +108,8 @@ class Problem(_relax.Relaxable):
         """Return growth rates of the mode from t = 0.5 to 1, by least squares.
 
         growth_rate: measured; linear_growth_rate: of linear theory at these times; growth_ratio:
-        growth_rate over linear_growth_rate. Empty if the history does not cover these times.
+        growth_rate over linear_growth_rate; growth_error: |growth_ratio - 1|. Empty if the history
+        does not cover these times.
         """
         t = history["t"]
         inside = (t >= GROWTH[0]) & (t <= GROWTH[1])
@@ -119,6 +122,7 @@ class Problem(_relax.Relaxable):
             "growth_rate": measured,
             "linear_growth_rate": by_theory,
             "growth_ratio": measured / by_theory,
+            "growth_error": abs(measured / by_theory - 1.0),
         }
 
 

@@ -30,6 +30,7 @@ class Placed(NamedTuple):
     position: np.ndarray  # (D, N)
     mass: np.ndarray | float  # (N,), or the volume by which the density is multiplied
     members: np.ndarray | None = None  # (R, N) which belong to each region; None: those inside
+    relaxation: base.Relaxation | None = None
 
 
 class Problem(_relax.Relaxable):
@@ -212,7 +213,7 @@ class Problem(_relax.Relaxable):
 
     def initial(self, eos) -> base.InitialState:
         """Return the particles. Raises ConfigError for values that are wrong at a particle."""
-        position, mass, members = self._placed()
+        position, mass, members, relaxation = self._placed()
         gas = self._gas(position, members)
         if faults := [one for one in gas.faults if len(one.path) > 2]:
             i, key, *_ = faults[0].path[1:]
@@ -221,13 +222,15 @@ class Problem(_relax.Relaxable):
         velocity = np.array([gas.values["velocity", axis] for axis in range(self.dimension)])
         energy = eos.internal_energy(density, gas.values["pressure",])
         found = density * mass if isinstance(mass, float) else mass
-        return base.InitialState(position, velocity, found, energy, {"density": density})
+        others = {"density": density}
+        return base.InitialState(position, velocity, found, energy, others, relaxation)
 
     def _placed(self) -> Placed:
         position, cell = self._even()
         if self.masses == "equal":
             return self._equal_masses()
-        return Placed(self.on_glass(position), cell)
+        placed = self.on_glass(position)
+        return Placed(placed.position, cell, relaxation=placed.relaxation)
 
     def _equal_masses(self) -> Placed:
         position, cell = self._even()
@@ -238,7 +241,8 @@ class Problem(_relax.Relaxable):
         # a particle that crosses an edge keeps its volume, else the regions would change in size
         members = self._members(start)
         found = self.relaxed(start, lambda x: each / self._density(x, members))
-        return Placed(found, np.full(found.shape[1], each), members)
+        mass = np.full(start.shape[1], each)
+        return Placed(found.position, mass, members, found.relaxation)
 
     def _separate_lattices(self, each: float) -> Placed:
         """Return a lattice for each region that gives a density, with masses near `each`."""

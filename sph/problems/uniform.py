@@ -85,12 +85,14 @@ class Problem(_relax.Relaxable):
         position = placement.fill(self.box, self.n, self.lattice, self.seed)
         if self.noise:
             position = placement.with_noise(position, self.box, self.noise, self.seed)
-        position = self.on_glass(position)
+        position, relaxation = self.on_glass(position)
         n = position.shape[1]
         volume = np.prod(self.box[:, 1] - self.box[:, 0])
         state = self.exact(eos, 0.0, position)
         mass = np.full(n, self.density * volume / n)
-        return base.InitialState(position, state["velocity"], mass, state["internal_energy"])
+        return base.InitialState(
+            position, state["velocity"], mass, state["internal_energy"], relaxation=relaxation
+        )
 
     def exact(self, eos, time: float, position: np.ndarray) -> dict[str, np.ndarray]:
         """Return the uniform state at (D, N) positions, which is steady."""

@@ -304,7 +304,7 @@ def returned(extension, body):
     """Check what the methods of a part with this body return."""
     extension(PART_FILE, with_body(body))
     scene = Scene(read())
-    state = State.at_start(scene.fields, *scene.initial_state())
+    state = State.at_start(scene.fields, *scene.initial_state().particles)
     declarations.check_returned(scene.all_parts, state)
 
 

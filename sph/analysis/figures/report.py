@@ -2,8 +2,9 @@
 
 import math
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -73,14 +74,15 @@ def _figure(report: Report, x, label: str, note: Callable[[Series], str], slopes
     for line in report.series:
         sweeps[line.sweep].append(line)
     several = len(sweeps) > 1
-    if several and note is power:  # no room for it, and it says the same as the order
+    shared = several and _have_same_lines(sweeps.values())
+    if shared or (several and note is power):  # no room for power, which says the same as the order
         note = _nothing
     picture, panels = _panels(len(sweeps))
     for panel, lines in zip(panels, sweeps.values(), strict=True):
         if under:
             under(panel, report)
         _lines(panel, report, lines, x, note)
-    if several:
+    if several and not shared:
         _room_for_legends(panels, max(map(len, sweeps.values())))
     for panel in panels:
         _guides(panel, x, report.error, slopes)
@@ -95,12 +97,19 @@ def _figure(report: Report, x, label: str, note: Callable[[Series], str], slopes
     if several:
         for panel, name in zip(panels, sweeps, strict=True):
             panel.set_title(name.replace("_", " "))
-            _legend_within(panel)
+            if not shared:
+                _legend_within(panel)
         picture.suptitle(_title(report))
     else:
         panels[0].set_title(_title(report))
-        _legend_below(picture, panels[0])
+    if shared or not several:
+        _legend_below(picture, panels)
     return picture
+
+
+def _have_same_lines(sweeps: Iterable[list[Series]]) -> bool:
+    """Whether the panels can share one legend: their lines have the same labels and colours."""
+    return len({tuple((line.label, line.group) for line in lines) for lines in sweeps}) == 1
 
 
 def _nothing(_line: Series) -> str:
@@ -143,7 +152,8 @@ def _lines(panel, report: Report, lines: Sequence[Series], x: np.ndarray, note) 
         which = list(line.members)
         marker = MARKERS[of_group[line.group] % len(MARKERS)]
         of_group[line.group] += 1
-        name = value_alone(line.label) if line.sweep else line.label
+        says_it = line.label.startswith(f"{line.sweep} = ")  # the panel is called as what varies
+        name = value_alone(line.label) if says_it else line.label
         label = ": ".join(filter(None, [short(name), note(line)]))
         panel.plot(
             x[which], report.error[which], marker + "-", ms=5, mew=0, color=colours[line.group],
@@ -215,13 +225,18 @@ def _letters(label: str) -> int:
     return len(re.sub(r"\\\w+", "x", re.sub(r"[${}^]", "", label)))
 
 
-def _legend_below(picture: Figure, panel) -> None:
-    handles, labels = panel.get_legend_handles_labels()
-    columns = 2 if max(map(_letters, labels)) < 55 and len(labels) > 2 else 1
-    picture.set_figheight(4.4 + 0.22 * math.ceil(len(labels) / columns))
+def _legend_below(picture: Figure, panels) -> None:
+    """One legend for all panels."""
+    shown: dict[str, Any] = {}
+    for panel in panels:
+        handles, labels = panel.get_legend_handles_labels()
+        shown |= {label: handle for handle, label in zip(handles, labels, strict=True)}
+    columns = 2 if max(map(_letters, shown)) < 55 and len(shown) > 2 else 1
+    picture.set_figheight(picture.get_figheight() + 0.22 * math.ceil(len(shown) / columns))
     picture.legend(
-        handles, labels, loc="outside lower center", ncols=columns, markerscale=0.7,
-        fontsize=10 if len(labels) <= MANY else 8,
+        list(shown.values()), list(shown), loc="outside lower center", ncols=columns,
+        markerscale=0.7,
+        fontsize=10 if len(shown) <= MANY else 8,
     )  # fmt: skip
 
 

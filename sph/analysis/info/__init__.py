@@ -50,7 +50,7 @@ def _of_run(run: RunDirectory) -> Found:
         "time": _time(summary) if summary else None,
         "errors": summary["errors"] if summary else None,
         "errors_left_out": summary["errors_left_out"] if summary else "the run has not ended",
-        "figures": _figures(config, summary) if summary else [],
+        "figures": _figures(config, summary or {"relaxation": run.read_relaxation() or {}}),
         "columns": _columns(config, rows),
         "compiled_in": summary["compiled_in"] if summary else None,
         "left_out": summary["left_out"] if summary else None,

@@ -125,6 +125,7 @@ HEADINGS = {
     "conservation": "Conservation",
     "nearest": "Distance to the nearest neighbour",
     "tearing": "Solid bodies",
+    "relaxation": "Relaxation to a glass",
     "cost": "Cost",
 }
 

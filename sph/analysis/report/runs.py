@@ -15,7 +15,7 @@ from sph.config.toml_text import value_text
 from sph.errors import ConfigError, FileError
 from sph.output.files import read_text
 from sph.output.run_directory import RunDirectory
-from sph.summary import Errors, Summary, lookup, wall_without_start
+from sph.summary import Errors, Relaxation, Summary, lookup, wall_without_start
 from sph.sweep.manifest import SweepDirectory
 
 
@@ -57,6 +57,11 @@ class Row:
         return self.reference or (self.summary["errors"] if self.summary else None)
 
     @property
+    def relaxation(self) -> Relaxation | None:
+        """How relaxation to a glass ended; None for runs that did not begin from a glass."""
+        return self.summary.get("relaxation") if self.summary else None
+
+    @property
     def truth(self) -> str | None:
         """The run that its errors are against, or None where that is the exact solution."""
         return self.errors.get("reference") if self.errors else None
@@ -79,12 +84,13 @@ class Row:
         if self.summary:
             names += [f"report.{name}" for name in self.summary["report"] or {}]
             names += [f"conservation.{name}" for name in self.summary["conservation"]]
+            names += [f"relaxation.{name}" for name in self.relaxation or {}]
         return names
 
     def value(self, key: str) -> str:
         """The value of a setting, as tables show it."""
         if key not in self.settings:
-            return "–"
+            return "none"
         found = self.settings[key]
         if isinstance(found, dict) and "name" in found:  # a model with parameters
             rest = [f"{name}={value_text(one)}" for name, one in found.items() if name != "name"]
@@ -113,6 +119,7 @@ def read(sources: Sequence[Path]) -> list[Row]:
         rows |= mine
     found = list(rows.values())
     _shorten_models(found)
+    _shorten_tables(found)
     return found
 
 
@@ -144,6 +151,26 @@ def _shorten_models(rows: Sequence[Row]) -> None:
         if all(row.settings[key] == those[0].settings[key] for row in those):
             for row in those:
                 row.settings[key] = name
+
+
+def _shorten_tables(rows: Sequence[Row]) -> None:
+    """Of a table that some runs lack, such as problem.relax, keep the keys whose values differ."""
+    for key in dict.fromkeys(key for row in rows for key in row.settings):
+        those = [row for row in rows if key in row.settings]
+        tables = [row.settings[key] for row in those]
+        if len(those) == len(rows) or any(not _is_plain_table(one) for one in tables):
+            continue
+        names = dict.fromkeys(name for one in tables for name in one)
+        differ = [name for name in names if any(one.get(name) != tables[0].get(name)
+                                                for one in tables)]  # fmt: skip
+        for row, table in zip(those, tables, strict=True):
+            left = [f"{name}={value_text(table[name])}" for name in differ if name in table]
+            row.settings[key] = f"{{{', '.join(left)}}}" if left else "given"
+
+
+def _is_plain_table(value: Any) -> bool:
+    """Whether a setting is a table that is not a model with parameters."""
+    return isinstance(value, dict) and "name" not in value
 
 
 def _runs_in(directory: Path) -> list[Path]:

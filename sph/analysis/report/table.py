@@ -11,6 +11,7 @@ from sph.output.json_text import json_text, null
 from sph.summary import lookup
 
 NORMS = ("L1", "L2", "Linf")
+RELAXATION = "relaxation CPU s"  # header of a column
 
 
 def as_text(report: Report) -> str:
@@ -76,6 +77,8 @@ def cells(report: Report) -> list[list[str]]:
     several = len({line.sweep for line in report.series}) > 1
     header = [*(["sweep"] if several else []), *shown, "N", "steps"]
     header += [] if question.cost == "n" else [COSTS[question.cost][1]]
+    shows_relaxation = any(row.relaxation for row in report.rows) and question.cost != "n"
+    header += [RELAXATION] if shows_relaxation else []
     header += [question.error_name, "energy drift", "against the front"]
     warned = any(row.warnings for row in report.rows)
     header += ["warnings"] if warned else []
@@ -84,11 +87,16 @@ def cells(report: Report) -> list[list[str]]:
         line = [row.sweep] if several else []
         line += [*(row.value(key) for key in shown), str(row.n), str(row.steps)]
         line += [] if question.cost == "n" else [f"{report.cost[i]:.3g}"]
+        line += [_relaxation_seconds(row)] if shows_relaxation else []
         drift = row.ended["conservation"]["energy_drift_max"]
         against = "front" if report.on_front[i] else f"× {report.excess[i]:.2f}"
         line += [f"{report.error[i]:.3g}", f"{drift:.1e}", against]
         lines.append([*line, ", ".join(row.warnings) or "–"] if warned else line)
     return [header, *lines]
+
+
+def _relaxation_seconds(row: Row) -> str:
+    return f"{row.relaxation['cpu_seconds']:.3g}" if row.relaxation else "–"
 
 
 def _records(report: Report) -> list[dict]:

@@ -20,6 +20,7 @@ def sentences(report: Report) -> list[str]:
         said += [
             _standing(report, line) for line in report.series if not _is_all_front(report, line)
         ]
+        said += _relaxation(report)
     said += [f"Without an error: {row.name} ({_reason(report, row)})." for row in report.without]
     return said + _warnings(report)
 
@@ -66,6 +67,29 @@ def _standing(report: Report, line: Series) -> str:
     front_error = report.error[report.on_front]
     bound = "at least " if np.all(report.error[off] > front_error.max()) else ""
     return f"{_name(line)} {where}: {bound}{times} the {what} of the front at equal error."
+
+
+def _relaxation(report: Report) -> list[str]:
+    """How much of the cost relaxation to a glass is."""
+    relaxed = [(row.cost["cpu"], row.relaxation) for row in report.rows if row.relaxation]
+    if not relaxed:
+        return []
+    if report.question.cost in ("updates", "n"):
+        what = COSTS[report.question.cost][0]
+        return [f"Relaxation to a glass has a cost besides the {what}: see --x cpu."]
+    seconds = [ended["cpu_seconds"] for _, ended in relaxed]
+    shares = [ended["cpu_seconds"] / whole for whole, ended in relaxed]
+    errors = [ended["density_error"] for _, ended in relaxed]
+    return [
+        f"Times include relaxation to a glass: {_range(seconds, '.2g')} CPU s, "
+        f"{_range(shares, '.2g')} of the CPU time of these runs. The density error after "
+        f"relaxation is {_range(errors, '.1e')}."
+    ]
+
+
+def _range(values: list[float], form: str) -> str:
+    low, high = format(min(values), form), format(max(values), form)
+    return low if low == high else f"{low} to {high}"
 
 
 def _warnings(report: Report) -> list[str]:

@@ -59,7 +59,7 @@ def rings():
     """A solid in 2-D with a stress in each component."""
     made = config.from_text('[problem]\nname = "rubber_rings"\nn = 300\n')
     scene = Scene(made)
-    particles = State.at_start(scene.fields, *scene.initial_state())
+    particles = State.at_start(scene.fields, *scene.initial_state().particles)
     particles.support[:] = 0.1
     particles.density[:] = 1.0
     particles.initial_support[:] = 0.1

@@ -450,7 +450,7 @@ def solid_state(yields=True) -> State:
         """
     )
     scene = Scene(made)
-    particles = Particles.at_start(scene.fields, *scene.initial_state())
+    particles = Particles.at_start(scene.fields, *scene.initial_state().particles)
     particles.density[:] = 1.0
     particles.support[:] = 2.4 * np.sqrt(particles.mass)
     particles.deviatoric_stress[0, 0] = 0.3

@@ -157,6 +157,41 @@ def test_model_parameters_shown_only_where_varied(tmp_path):
     ]
 
 
+RELAXED = {"iterations": 70, "density_error": 8e-4, "mean_offset": 5e-3, "cpu_seconds": 0.5}
+
+
+@pytest.fixture
+def on_glass(tmp_path):
+    """A vortex on a lattice, and on a glass of two seeds."""
+    for seed, ended in ((None, {}), (0, {"relaxation": RELAXED}), (1, {"relaxation": RELAXED})):
+        relax = "none" if seed is None else f"{{seed = {seed}}}"
+        keys = ["problem.name=uniform", "problem.dimension=2", f"problem.relax={relax}"]
+        write_run(tmp_path / "s" / relax, 0.1, 2.0, keys, **ended)
+    return tmp_path / "s"
+
+
+def test_table_that_some_runs_lack_is_shortened(on_glass):
+    assert [line.label for line in compared(on_glass).series] == [
+        "relax = none", "relax = {seed=0}", "relax = {seed=1}",
+    ]  # fmt: skip
+    fewer = compared(*(on_glass / one for one in ("none", "{seed = 0}")))
+    assert [line.label for line in fewer.series] == ["relax = given", "relax = none"]
+
+
+def test_relaxation_is_stated_in_table_words_and_records(on_glass):
+    report = compared(on_glass)
+    header, *lines = table.cells(report)
+    at = header.index("relaxation CPU s")
+    assert [line[at] for line in lines] == ["–", "0.5", "0.5"]
+    assert "relaxation to a glass: 0.5 CPU s, 0.25 of the CPU time of these runs" in said(report)
+    records = json.loads(table.as_json(report, []))["runs"]
+    assert [one.get("relaxation.density_error") for one in records] == [None, 8e-4, 8e-4]
+    by_updates = compared(on_glass, cost="updates")
+    assert "besides the particle updates" in said(by_updates)
+    by_residual = compared(on_glass, field="relaxation.density_error")
+    assert by_residual.error.tolist() == [8e-4, 8e-4]
+
+
 def test_run_given_twice_counts_once(study):
     assert len(runs.read([study, study / "n=100,alpha=1.0"])) == 6
 
@@ -600,6 +635,20 @@ def test_pictures_several_sweeps_have_one_panel_each(tmp_path):
     ]
     assert CliRunner().invoke(main, ["report", str(first), str(second)]).exit_code == 0
     assert "| wide | { min = 0.1, max = 2.0" in (first / "report" / "report.md").read_text()
+
+
+def test_pictures_sweeps_with_same_lines_share_one_legend(tmp_path):
+    from sph.analysis.figures import report as pictures
+
+    sweeps = [sweep_of(tmp_path / name, "1.0,2.0", 1.0) for name in ("coarse", "fine")]
+    report = compared(*sweeps)
+    for picture in (pictures.error_against_cost(report), pictures.error_against_number(report)):
+        assert [panel.get_legend() for panel in picture.axes] == [None, None]
+        (legend,) = picture.legends
+        names = [text.get_text() for text in legend.get_texts()]
+        assert [name for name in names if "alpha" in name] == [r"$\alpha$ = 1.0", r"$\alpha$ = 2.0"]
+    other = compared(sweeps[0], sweep_of(tmp_path / "more", "1.0,3.0", 1.0))
+    assert all(panel.get_legend() for panel in pictures.error_against_cost(other).axes)
 
 
 def test_picture_labels_are_short():

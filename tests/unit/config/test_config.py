@@ -290,6 +290,34 @@ def test_override_of_problem_name_changes_problem(tmp_path):
     assert config.load(path, ["problem.name=shock_tube"]) == default()
 
 
+def test_override_none_leaves_key_out(tmp_path):
+    path = tmp_path / "a.toml"
+    path.write_text('[problem]\nname = "gresho"\nmach = 0.1\n[problem.relax]\nseed = 3\n')
+    assert config.load(path).problem.relax.seed == 3
+    found = config.load(path, ["problem.relax=none", "problem.mach = none "])
+    assert found == config.from_text('[problem]\nname = "gresho"\n')
+    assert config.as_overrides({"problem.relax": None}) == ["problem.relax=none"]
+    # in place of another key it gives nothing: gamma stays
+    assert default("physics.gamma=2", "physics.eos=none").physics.gamma == 2.0
+    # the last one wins
+    assert config.load(path, ["problem.relax=none", "problem.relax={}"]).problem.relax.seed == 0
+    assert config.load(path, ["problem.n=none", "problem.n=64"]).problem.n == 64
+
+
+@pytest.mark.parametrize(
+    "key", ["problem.n", "physics.gamma", "problem.left.density", "problem.lefd", "time.end"]
+)
+def test_override_none_of_key_that_needs_value_is_refused(messages, key):
+    with messages.raised(ConfigError, key):
+        default(f"{key}=none")
+
+
+def test_override_none_of_key_with_default_of_problem_is_refused(messages):
+    text = '[problem]\nname = "rayleigh_taylor"\n'
+    with messages.raised(ConfigError, "physics.external"):
+        config.from_text(text).override(["physics.external=none"])
+
+
 def test_override_leaves_original_unchanged():
     before = default("problem.left.density=2")
     before.override(["problem.left.density=3", "physics.alpha={min=0, max=1}"])

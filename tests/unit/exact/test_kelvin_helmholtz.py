@@ -114,4 +114,5 @@ def test_problem_theory_growth_matches_linear_theory():
     assert found["growth_ratio"] == pytest.approx(1.0, rel=1e-5)  # the tolerance of the steps
     slower = problem.over_time(eos, {"t": t, "mode_amplitude": amplitude * np.exp(-t)})
     assert slower["growth_rate"] == pytest.approx(found["growth_rate"] - 1.0, rel=1e-5)
+    assert slower["growth_error"] == pytest.approx(1.0 - slower["growth_ratio"], rel=1e-5)
     assert problem.over_time(eos, {"t": t[t < 0.9], "mode_amplitude": amplitude[t < 0.9]}) == {}

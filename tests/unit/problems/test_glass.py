@@ -1,14 +1,22 @@
 """Relaxation to a glass: densities, regularity, boundaries, and what stops it."""
 
+import shutil
+
 import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
-from sph import config, kernels
+from sph import config, kernels, restarting, runner
+from sph.analysis import info
+from sph.analysis.html import run_page
+from sph.analysis.info import words
+from sph.analysis.summary import in_words
 from sph.clock import Clock
 from sph.domain import Domain
 from sph.errors import ConfigError
+from sph.output.run_directory import RunDirectory
 from sph.problems.support import areas, glass, lattice
+from sph.progress import Lines
 from sph.scene import Scene
 from sph.simulation import Simulation
 
@@ -136,6 +144,51 @@ def test_density_of_run_scatters_as_little(dimension, n):
     simulation.close()
     # supports follow the density in a run: the scatter of the sums changes by a few per cent
     assert density.std() / density.mean() < 1e-3
+
+
+@pytest.fixture(scope="module")
+def glass_run(tmp_path_factory):
+    """The directory and the summary of a short run that begins from a glass."""
+    text = '[problem]\nname = "uniform"\ndimension = 2\nn = 400\nrelax = {}\n'
+    keys = ["time.end=0.02", "output.interval=0.01", "run.threads=1"]
+    directory = RunDirectory.create(tmp_path_factory.mktemp("glass") / "run")
+    return directory, runner.run(config.from_text(text).override(keys), directory, Lines())
+
+
+def test_summary_tells_how_relaxation_ended(glass_run):
+    directory, summary = glass_run
+    found = summary["relaxation"]
+    same = relaxed(cube(2, side=2.0), 400)  # the problem's box; another place changes round-off
+    assert found["iterations"] == same.iterations
+    assert found["density_error"] == pytest.approx(same.scatter, rel=1e-3)
+    assert found["mean_offset"] == pytest.approx(same.mean - 1.0, abs=1e-5)
+    assert 0.0 < found["cpu_seconds"] <= summary["cost"]["cpu_seconds"]
+    said = f"Glass, after {found['iterations']} iterations: density error "
+    assert said in in_words(summary)
+    of_info = {one["name"]: one for one in info.of(directory.path)["figures"]}
+    for name, value in found.items():
+        one = of_info[f"relaxation.{name}"]
+        assert one["value"] == value
+        assert one["meaning"]
+    assert "Relaxation to a glass" in run_page.text(info.of(directory.path), [])
+    assert "eq 461" in words.in_words(info.of(directory.path))
+
+
+def test_info_of_unfinished_run_tells_how_relaxation_ended(glass_run, tmp_path):
+    directory, summary = glass_run
+    shutil.copytree(directory.path, tmp_path / "run")
+    (tmp_path / "run" / "summary.json").unlink()
+    found = {one["name"]: one["value"] for one in info.of(tmp_path / "run")["figures"]}
+    assert found == {f"relaxation.{name}": value for name, value in summary["relaxation"].items()}
+
+
+def test_restart_keeps_how_relaxation_ended(glass_run, tmp_path):
+    directory, summary = glass_run
+    first = directory.checkpoint_path(1)
+    again, _ = restarting.restart(first, [], tmp_path / "again", Lines())
+    assert again["relaxation"] == summary["relaxation"]
+    overwritten = RunDirectory.create(tmp_path / "again", force=True)
+    assert overwritten.read_relaxation() is None
 
 
 def test_residual_out_of_reach_is_refused(messages):
