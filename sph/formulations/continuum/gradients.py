@@ -45,6 +45,9 @@ from sph.simd import (
     zeros,
 )
 
+# Ratio of volumes half a step ago and now below which eq 406 is not used.
+LEAST_VOLUME = 0.1
+
 # Condition number of M above which order 1 falls back to order 0; relative to the identity, M is
 # zero below the inverse of this number.
 SINGULAR = 1e6
@@ -141,12 +144,12 @@ def gradients(
                             for b in range(D):
                                 identity = alpha if a == b else 0.0
                                 kernel_matrix[a, b, i] = B[a, b] if is_regular else identity
-                _fill_product(M, L)
-                divergence, back = 0.0, 0.5 * dt / per_rate
+                _centred(L, B, M, 0.5 * dt / per_rate)
+                divergence = 0.0
                 for a in range(D):
+                    divergence += M[a, a] / per_rate
                     for b in range(D):
-                        velocity_gradient[a, b, i] = (L[a, b] + back * M[a, b]) / per_rate
-                    divergence += velocity_gradient[a, a, i]
+                        velocity_gradient[a, b, i] = M[a, b] / per_rate
                 div_v[i] = divergence
                 growth = np.expm1(-divergence * dt) / dt if dt > 0.0 else -divergence
                 density_rate[i] = before[i] * growth  # eq 407
@@ -193,23 +196,50 @@ def _times_matrix(M, B, L):
 
 
 @njit(**INLINED)
-def _fill_product(matrix, L):
-    """Set a matrix to L L."""
-    D = L.shape[0]
-    for a in range(D):
-        for b in range(D):
-            matrix[a, b] = 0.0
-            for c in range(D):
-                matrix[a, b] += L[a, c] * L[c, b]
-
-
-@njit(**INLINED)
 def _corrected(M, alpha, mixed, grad_alpha, L):
     """Set L to eq 405 at order 0."""
     D = M.shape[0]
     for a in range(D):
         for b in range(D):
             L[a, b] = -alpha * M[a, b] - mixed[a] * grad_alpha[b]
+
+
+@njit(**INLINED)
+def _centred(L, B, M, half):
+    """Set M to L (I - half L)^-1, eq 406; B is overwritten.
+
+    M is L where half a step backwards would turn the matter inside out, or nearly so.
+    """
+    D = L.shape[0]
+    for a in range(D):
+        for b in range(D):
+            B[a, b] = (1.0 if a == b else 0.0) - half * L[a, b]
+    if D == 1:
+        determinant = B[0, 0]
+        inverse = (1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    elif D == 2:
+        determinant = B[0, 0] * B[1, 1] - B[0, 1] * B[1, 0]
+        inverse = (B[1, 1], -B[0, 1], -B[1, 0], B[0, 0], 0.0, 0.0, 0.0, 0.0, 0.0)
+    else:
+        inverse = (
+            B[1, 1] * B[2, 2] - B[1, 2] * B[2, 1],
+            B[0, 2] * B[2, 1] - B[0, 1] * B[2, 2],
+            B[0, 1] * B[1, 2] - B[0, 2] * B[1, 1],
+            B[1, 2] * B[2, 0] - B[1, 0] * B[2, 2],
+            B[0, 0] * B[2, 2] - B[0, 2] * B[2, 0],
+            B[0, 2] * B[1, 0] - B[0, 0] * B[1, 2],
+            B[1, 0] * B[2, 1] - B[1, 1] * B[2, 0],
+            B[0, 1] * B[2, 0] - B[0, 0] * B[2, 1],
+            B[0, 0] * B[1, 1] - B[0, 1] * B[1, 0],
+        )
+        determinant = B[0, 0] * inverse[0] + B[0, 1] * inverse[3] + B[0, 2] * inverse[6]
+    is_regular = determinant > LEAST_VOLUME
+    for a in range(D):
+        for b in range(D):
+            total = 0.0
+            for c in range(D):
+                total += L[a, c] * inverse[c * D + b]
+            M[a, b] = total / determinant if is_regular else L[a, b]
 
 
 @njit(**INLINED)

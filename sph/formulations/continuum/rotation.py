@@ -1,18 +1,12 @@
-"""Integration of the deviatoric stress, with the exact rotation of a step (eqs 430-431).
+"""Integration of the deviatoric stress, with the rotation of a step (eqs 430-431).
 
-The rate of the stress (D, D) holds two things: its symmetric part is the rate by Hooke's law, and
-its antisymmetric part the spin of the material, (L - L^T)/2 with L the velocity gradient. The usual
-Jaumann rate, in which the spin enters as one more rate, changes |S| in a pure rotation; a rotation
-of the stress does not.
+The usual Jaumann rate, in which the spin enters as one more rate, changes |S| in a pure rotation; a
+rotation of the stress does not.
 """
 
-import numpy as np
 from numba import njit
 
-from sph.compiled import INLINED, larger
-
-# sin(x)/x is 1 to the last bit below this angle.
-SMALLEST_ANGLE = 1e-8
+from sph.compiled import INLINED
 
 
 @njit(**INLINED)
@@ -62,8 +56,10 @@ def _sum_2(a, b):
 
 @njit(**INLINED)
 def _rotation_2(L, i, time):
-    angle = 0.5 * (L[0, 1, i] - L[1, 0, i]) * time
-    return np.cos(angle), np.sin(angle)
+    """Return cosine and sine of 2 arctan(x), x = half the spin times time (eq 431)."""
+    x = 0.25 * (L[0, 1, i] - L[1, 0, i]) * time
+    scale = 1.0 / (1.0 + x * x)
+    return (1.0 - x * x) * scale, 2.0 * x * scale
 
 
 @njit(**INLINED)
@@ -110,18 +106,15 @@ def _sum_3(a, b):
 
 @njit(**INLINED)
 def _rotation_3(L, i, time):
-    """Return exp(spin time) by Rodrigues' formula: I + (sin t/t) A + ((1 - cos t)/t^2) A^2."""
-    a = 0.5 * (L[0, 1, i] - L[1, 0, i]) * time
-    b = 0.5 * (L[0, 2, i] - L[2, 0, i]) * time
-    c = 0.5 * (L[1, 2, i] - L[2, 1, i]) * time
-    angle = larger(np.sqrt(a * a + b * b + c * c), SMALLEST_ANGLE)
-    s = np.sin(angle) / angle
-    k = np.sin(0.5 * angle) / angle
-    k = 2.0 * k * k
+    """Return (I - A)^-1 (I + A) = I + 2 (A + A^2)/(1 + |A|^2/2), A = half the spin times time."""
+    a = 0.25 * (L[0, 1, i] - L[1, 0, i]) * time
+    b = 0.25 * (L[0, 2, i] - L[2, 0, i]) * time
+    c = 0.25 * (L[1, 2, i] - L[2, 1, i]) * time
+    k = 2.0 / (1.0 + a * a + b * b + c * c)
     return (
-        (1.0 - k * (a * a + b * b), s * a - k * b * c, s * b + k * a * c),
-        (-s * a - k * b * c, 1.0 - k * (a * a + c * c), s * c - k * a * b),
-        (-s * b + k * a * c, -s * c - k * a * b, 1.0 - k * (b * b + c * c)),
+        (1.0 - k * (a * a + b * b), k * (a - b * c), k * (b + a * c)),
+        (-k * (a + b * c), 1.0 - k * (a * a + c * c), k * (c - a * b)),
+        (k * (a * c - b), -k * (c + a * b), 1.0 - k * (b * b + c * c)),
     )
 
 
