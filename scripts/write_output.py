@@ -1,4 +1,4 @@
-"""Write docs/output.md: every column of history.csv and entry of summary.json, from their sources.
+"""Write docs/output.md: columns of history.csv, entries of summary.json, datasets of frames.
 
 python scripts/write_output.py
 """
@@ -8,13 +8,15 @@ from pathlib import Path
 
 from sph import columns, meanings, registry
 from sph.config.physics import FORMULATIONS
+from sph.output.frames import CONTENTS, OF_ALL
 from sph.quantity import Quantity
 
 TARGET = Path(__file__).parents[1] / "docs" / "output.md"
-HEAD = """# Output: history and summary
+HEAD = """# Output: history, summary and frames
 
-The meaning and unit of every column of `history.csv` and of every entry of `summary.json`. The
-command `python scripts/write_output.py` writes this page from the definitions in the sources.
+The meaning and unit of every column of `history.csv`, of every entry of `summary.json`, and of
+every dataset of the frames for movies. The command `python scripts/write_output.py` writes this
+page from the definitions in the sources.
 `sph info RUN` prints the figures of a run with these meanings. [snapshot.md](snapshot.md)
 describes the checkpoints.
 
@@ -22,6 +24,29 @@ Length, mass and time are those of the configuration (code units). D is the numb
 the mass of a run in 1-D is mass per area, in 2-D mass per length. Entries without a unit are
 ratios, counts or texts. `history.csv` has full precision; a number that JSON cannot express is
 `"nan"`, `"inf"` or `"-inf"` in `summary.json`.
+"""
+
+
+FRAMES = """## Frames
+
+With `output.frames = N` a run writes N frames for movies, evenly spaced from t = 0 to `time.end`:
+`frames/frame_00000123.h5` holds the end of step 123. Frames change no step and no result: a frame
+shows the end of the step that first reaches its time, and states the true time. Steps that are
+longer than the spacing make fewer frames. A frame has a seventh of the bytes of a checkpoint.
+`sph` writes a frame under a temporary name and renames it, so a frame is either complete or absent,
+and a run that is killed keeps its frames. A restart removes frames of later steps than its
+checkpoint, and continues.
+
+A frame is an HDF5 file with the attributes `time`, `step` and `format_version`. Each dataset has an
+attribute `offset`, one number for each component: **the value is the dataset plus its offset**. The
+offset is zero unless the values differ by less than a tenth of their size, where single precision
+alone would lose digits. A dataset is in double precision if its largest value is above 1e38 or
+below 1e-30. Particles are in memory order, which changes from frame to frame.
+
+    import h5py
+    with h5py.File("frames/frame_00000123.h5") as frame:
+        time = frame.attrs["time"]
+        density = frame["density"][:] + frame["density"].attrs["offset"]
 """
 
 
@@ -41,6 +66,8 @@ def text() -> str:
         "## summary.json\n\nEntries of tables are written TABLE.NAME, those of lists TABLE[].NAME; "
         "FIELD is the name of a field.\n",
         _table("entry", meanings.of_summary()),
+        FRAMES,
+        _frames(),
         "## Columns and figures of problems\n\nFigures stand in the table `report` of the summary, "
         "and columns in the history. Many figures exist\nonly at some times and settings. `*` "
         "stands for any text.\n",
@@ -49,6 +76,15 @@ def text() -> str:
         if quantities := registry.load("sph.problems", name).Problem.quantities:
             parts += [f"### {name}\n", _table("name", quantities)]
     return "\n".join(parts)
+
+
+def _frames() -> str:
+    """Return the table of the datasets of a frame."""
+    rows = [
+        (f"`{name}`", shape, _unit(one.unit), one.help, "" if name in OF_ALL else "a solid")
+        for name, (one, shape) in CONTENTS.items()
+    ]
+    return _lines(("dataset", "shape", "unit", "meaning", "only if"), rows)
 
 
 def _of_parts() -> dict[str, Quantity]:

@@ -28,27 +28,9 @@ THREADS = click.option(
     metavar="N",
     help="Number of threads. Overrides the key run.threads.",
 )
-MAP_FIELDS = ("density", "pressure", "internal_energy", "speed", "plastic_strain", "von_mises")
 STRICT = click.option(
     "--strict", is_flag=True, help="Exit with code 3 if the finished run has warnings."
 )
-DPI = click.option("--dpi", type=click.IntRange(20, 1200), metavar="N",
-                   help="Pixels per inch. Default: 180.")  # fmt: skip
-
-
-def map_options(command):
-    """Add the options of maps."""
-    for option in (
-        click.option("--zoom", nargs=4, type=float, metavar="X0 X1 Y0 Y1",
-                     help="Draw this part of the domain. Default: all of it."),
-        click.option("--log", is_flag=True, help="Use a logarithmic scale of colours."),
-        click.option("--range", "limits", nargs=2, type=float, metavar="LO HI",
-                     help="Ends of the scale of colours. Default: those of the values."),
-        click.option("--field", type=click.Choice(MAP_FIELDS),
-                     help="Quantity to draw. Default: density, or stress of a solid."),
-    ):  # fmt: skip
-        command = option(command)
-    return command
 
 
 class Program(click.Group):
@@ -87,7 +69,7 @@ def main():
       sph new shock_tube -o tube.toml    writes a commented configuration
       sph run tube.toml                  runs it, in the directory runs/tube
       sph plot runs/tube                 draws profiles and the history
-      sph movie runs/shear               makes a movie of a 2-D or 3-D run
+      sph movie runs/tube                makes a movie
 
     \b
     Exit codes: 0 done, 2 wrong configuration or command line, 3 numerical
@@ -152,53 +134,6 @@ def restart(source, overrides, threads, directory, strict):
 
     overrides = _with_threads(overrides, threads)
     _print_result(*restarting.restart(source, overrides, directory, progress.suited()), strict)
-
-
-@main.command()
-@click.argument("sources", metavar="RUN_OR_CHECKPOINT...", nargs=-1, required=True,
-                type=click.Path(path_type=Path))  # fmt: skip
-@click.option("-o", "target", type=click.Path(path_type=Path), metavar="FILE",
-              help="Write one picture to FILE. Default: several, in figures/.")  # fmt: skip
-@map_options
-@click.option("--time", "times", multiple=True, type=float, metavar="T",
-              help="Draw the checkpoint nearest to time T. May be repeated. "
-              "Default: the last.")  # fmt: skip
-@DPI
-def plot(sources, target, field, limits, log, zoom, times, dpi):
-    """Draw profiles, maps, slices and the history of runs.
-
-    RUN_OR_CHECKPOINT is a run directory or a checkpoint file. Options of maps
-    (--field, --range, --log, --zoom) and --time draw one picture alone, in
-    figures/map_of_FIELD.png.
-    """
-    from sph.analysis import figures
-
-    view = figures.View(field, limits, log, zoom)
-    chosen = view if view != figures.View() else None
-    for path in figures.draw(sources, target, chosen, times, dpi):
-        click.echo(f"drew {path}")
-
-
-@main.command()
-@click.argument("source", metavar="RUN", type=click.Path(path_type=Path))
-@click.option("-o", "target", type=click.Path(path_type=Path), metavar="FILE",
-              help="Write to FILE, .gif or .mp4. Default: figures/movie.gif.")  # fmt: skip
-@map_options
-@click.option("--fps", type=click.IntRange(1, 60), default=10, show_default=True, metavar="N",
-              help="Frames per second.")  # fmt: skip
-@DPI
-def movie(source, target, field, limits, log, zoom, fps, dpi):
-    """Make a movie of a 2-D or 3-D run, one frame for each checkpoint.
-
-    All frames have one size, one part of the domain and one scale of colours.
-    The key output.interval sets the time between checkpoints. Files .mp4 need
-    the package imageio-ffmpeg.
-    """
-    from sph.analysis import figures
-    from sph.analysis.figures import movie as movies
-
-    view = figures.View(field, limits, log, zoom)
-    click.echo(f"drew {movies.make(source, target, view, fps, dpi)}")
 
 
 @main.command()
@@ -268,6 +203,8 @@ def _with_threads(overrides, threads):
     return [*overrides, *([f"run.threads={threads}"] if threads else [])]
 
 
+main.add_command(cli_results.plot)
+main.add_command(cli_results.movie)
 main.add_command(cli_results.info)
 main.add_command(cli_results.export)
 main.add_command(cli_studies.sweep)

@@ -1,10 +1,117 @@
-"""The commands on results: `sph info` and `sph export`."""
+"""The commands on results: `sph plot`, `sph movie`, `sph info` and `sph export`."""
 
 from pathlib import Path
 
 import click
 
 from sph import standard_streams
+from sph.errors import ConfigError
+
+MAP_FIELDS = ("density", "pressure", "internal_energy", "speed", "plastic_strain", "von_mises")
+AXES = ("x", "y", "z")
+DPI = click.option("--dpi", type=click.IntRange(20, 1200), metavar="N",
+                   help="Pixels per inch. Default: 180.")  # fmt: skip
+
+
+def _slice(_context, _option, text):
+    """The axis and the value of x=0.5. Raises BadParameter."""
+    if text is None:
+        return None
+    axis, _, value = text.partition("=")
+    try:
+        return AXES.index(axis), float(value)
+    except ValueError:
+        raise click.BadParameter(f"{text}: expected x, y or z and a number, as in z=0.5.") from None
+
+
+def _axis(_context, _option, name):
+    return None if name is None else AXES.index(name)
+
+
+def map_options(command):
+    """Add the options of maps, by the names in `figures.View`."""
+    for option in (
+        click.option("--projection", type=click.Choice(AXES), callback=_axis,
+                     help="Of a 3-D run, draw the column density, or the mean of --field "
+                     "weighted by mass, along this axis."),
+        click.option("--slice", metavar="AXIS=VALUE", callback=_slice,
+                     help="Draw this slice of a 3-D run, e.g. --slice x=0.5. Default: z at the "
+                     "centre of the problem."),
+        click.option("--zoom", nargs=4, type=float, metavar="X0 X1 Y0 Y1",
+                     help="Draw this part of the domain: ends of the horizontal and of the "
+                     "vertical axis. Default: all of it."),
+        click.option("--log", "is_log", is_flag=True,
+                     help="Use a logarithmic scale of colours, of four decades at most without "
+                     "--range."),
+        click.option("--range", "limits", nargs=2, type=float, metavar="LO HI",
+                     help="Ends of the scale of colours. Default: those of the values."),
+        click.option("--field", type=click.Choice(MAP_FIELDS),
+                     help="Quantity to draw. Default: density, or stress of a solid."),
+    ):  # fmt: skip
+        command = option(command)
+    return command
+
+
+@click.command()
+@click.argument("sources", metavar="RUN_OR_CHECKPOINT...", nargs=-1, required=True,
+                type=click.Path(path_type=Path))  # fmt: skip
+@click.option("-o", "target", type=click.Path(path_type=Path), metavar="FILE",
+              help="Write one picture to FILE. Default: several, in figures/.")  # fmt: skip
+@map_options
+@click.option("--time", "times", multiple=True, type=float, metavar="T",
+              help="Draw the checkpoint nearest to time T. May be repeated. "
+              "Default: the last.")  # fmt: skip
+@click.option("--live", is_flag=True,
+              help="Draw one run while it goes on, in a window or, without a display, "
+              "in figures/live.png.")  # fmt: skip
+@DPI
+def plot(sources, target, times, live, dpi, **options):
+    """Draw profiles, maps, slices and the history of runs.
+
+    RUN_OR_CHECKPOINT is a run directory or a checkpoint file. Options of maps
+    (--field, --range, --log, --zoom, --slice, --projection) and --time draw
+    one picture alone, such as figures/map_of_density.png.
+
+    With --live, the picture of RUN is drawn again after each checkpoint and
+    each frame (output.frames), until the run ends, the window is closed or
+    Ctrl-C. With -o FILE.png the picture goes to FILE in place of a window.
+    """
+    from sph.analysis import figures
+
+    view = figures.View(**options)
+    chosen = view if view != figures.View() else None
+    if live:
+        from sph.analysis.figures import live as live_picture
+
+        if len(sources) > 1 or times:
+            raise ConfigError("--live draws one run, and its newest state: leave out --time.")
+        click.echo(live_picture.watch(sources[0], chosen, target, dpi, click.echo))
+        return
+    for path in figures.draw(sources, target, chosen, times, dpi):
+        click.echo(f"drew {path}")
+
+
+@click.command()
+@click.argument("source", metavar="RUN", type=click.Path(path_type=Path))
+@click.option("-o", "target", type=click.Path(path_type=Path), metavar="FILE",
+              help="Write to FILE, .gif or .mp4. Default: figures/movie.gif.")  # fmt: skip
+@map_options
+@click.option("--fps", type=click.IntRange(1, 60), default=10, show_default=True, metavar="N",
+              help="Frames per second.")  # fmt: skip
+@DPI
+def movie(source, target, fps, dpi, **options):
+    """Make a movie of a run from its frames or, without these, its checkpoints.
+
+    The key output.frames sets the number of frames. All pictures have one
+    size, one part of the domain and one scale of colours; those of a 1-D run
+    are profiles with the same axes. Files .mp4 need the package
+    imageio-ffmpeg.
+    """
+    from sph.analysis import figures
+    from sph.analysis.figures import movie as movies
+
+    made = movies.make(source, target, figures.View(**options), fps, dpi)
+    click.echo(f"drew {made}")
 
 
 @click.command()

@@ -11,7 +11,8 @@ from sph.config import Config
 from sph.errors import ConfigError, NumericalError
 from sph.integrators.step_size import StepLimit
 from sph.neighbours import BALL
-from sph.runner import output_times, threads_of
+from sph.output.times import output_times
+from sph.runner import threads_of
 from sph.scene import Scene
 from sph.simulation import Simulation
 
@@ -70,9 +71,14 @@ def describe(config: Config) -> str:
         f"t = {config.time.end:g}.",
         f"Time: a step costs {per_step:.2g} CPU s, and all steps about {per_step * steps:.2g} "
         f"CPU s on {threads_of(config)} thread(s).",
-        f"Output: {outputs} checkpoints.",
+        f"Output: {outputs} checkpoints{_frames(config)}.",
     ]
     return "\n".join(lines)
+
+
+def _frames(config: Config) -> str:
+    number = config.output.frames
+    return "" if number is None else f", and {number} frames, at most one a step"
 
 
 def _count(number: float, is_exact: bool) -> str:

@@ -37,6 +37,7 @@ FIELDS = {
     "x": Quantity("position along x", LENGTH),
     "r": Quantity("distance from the centre of the problem", LENGTH),
     "density": Quantity("density", DENSITY),
+    "column_density": Quantity("mass per area along a line of sight", "mass length^-2"),
     "velocity": Quantity("velocity along the coordinate of the profile", VELOCITY),
     "velocity_phi": Quantity("velocity across the radius", VELOCITY),
     "v_r": Quantity("velocity along the radius", VELOCITY),

@@ -22,7 +22,8 @@ from sph.output.history import History
 from sph.output.history import read as read_history
 from sph.output.offenders import PART
 from sph.output.run_directory import RunDirectory, checkpoint_number, find
-from sph.runner import Runner, new_history, output_times, session, threads_of
+from sph.output.times import output_times
+from sph.runner import Runner, new_history, session, threads_of
 from sph.scene import Scene
 from sph.simulation import Simulation
 from sph.totals import Budget
@@ -58,7 +59,7 @@ def restart(
     if source.is_dir():
         _note_damaged(home, path, progress)
         _note_other_settings(home, checkpoint.config, config, progress)
-    target, number = _place_to_go_on(home, path, directory)
+    target, number = _place_to_go_on(home, path, checkpoint.step, directory)
     if reason := fingerprint.differences(checkpoint.computed_by):
         progress.note(reason)
     with session(target, config, progress) as (stopped_by, clock):
@@ -93,6 +94,7 @@ def _begin_anew(target: RunDirectory, number: int, begun: Checkpoint, is_changed
     for old in (target.summary, target.offenders):
         old.unlink(missing_ok=True)
     target.drop_checkpoints_after(number)
+    target.frames.drop_after(begun.step)
     if is_changed:
         checkpoints.write(target.checkpoint_path(number), begun)
     target.write_config(begun.config.to_toml())
@@ -231,7 +233,7 @@ def _note_damaged(home: RunDirectory, good: Path, progress) -> None:
 
 
 def _place_to_go_on(
-    home: RunDirectory | None, path: Path, directory: Path | None
+    home: RunDirectory | None, path: Path, step: int, directory: Path | None
 ) -> tuple[RunDirectory, int]:
     """Return the run directory to continue in, filled if new, and the checkpoint number."""
     if directory is None and home is None:
@@ -251,4 +253,8 @@ def _place_to_go_on(
     for path in (home.history, home.problem, home.relaxation):
         if path.exists():
             copy_file(path, target.path / path.name)
+    if frames := home.frames.up_to(step):
+        with target.frames.held():
+            for frame in frames:
+                copy_file(frame, target.frames.path / frame.name)
     return target, number

@@ -1,7 +1,5 @@
 """The loop of a run over steps and outputs: checkpoints, history, progress and summary."""
 
-import itertools
-import math
 from collections.abc import Iterator
 from contextlib import closing, contextmanager, suppress
 from pathlib import Path
@@ -19,16 +17,15 @@ from sph.output import offenders
 from sph.output.checkpoint import Checkpoint
 from sph.output.history import History
 from sph.output.history import read as read_history
+from sph.output.recorder import Recorder
 from sph.output.run_directory import RunDirectory
+from sph.output.times import output_times
 from sph.scene import Scene
 from sph.shell_words import quoted
 from sph.simulation import PLACING, Simulation
 from sph.steps import MOST
 from sph.stop_signals import stop_signals
 from sph.threads import available_processors
-
-# Times closer than this, relative to the output interval or the end, count as equal.
-SAME_TIME = 1e-9
 
 
 def run(config: Config, directory: RunDirectory, progress) -> dict:
@@ -124,20 +121,6 @@ def threads_of(config: Config) -> int:
     return config.run.threads
 
 
-def output_times(end: float, interval: float, after: float = 0.0) -> Iterator[float]:
-    """Yield the times of checkpoints after `after`: multiples of `interval`, and `end`."""
-    same = SAME_TIME * min(interval, end)
-    for k in itertools.count(max(1, math.floor(after / interval))):
-        # rounded to 15 digits, so that 3 x 0.1 equals 0.3, the end of a run to 0.3
-        time = float(f"{k * interval:.15g}")
-        if time >= end - same:
-            break
-        if time > after + same:
-            yield time
-    if end > after + same:
-        yield end
-
-
 class Runner:
     """The loop over steps and outputs, from a start or a restart."""
 
@@ -151,11 +134,13 @@ class Runner:
         self.number = 0  # of the next checkpoint
         self.saved_step = None  # step of the last checkpoint
         self.lineage = ()
+        self.frames = Recorder(config, directory.frames)
         self.wall_before = self.cpu_before = 0.0  # of earlier sessions
 
     def from_start(self) -> dict:
         with self._closing():
             self.simulation.keep_row()
+            self.frames.begin(self.simulation)
             self._write_checkpoint()
             return self._to_end()
 
@@ -168,12 +153,14 @@ class Runner:
             else:  # a checkpoint without history: begin one, whose first row has no limiter
                 self.simulation.keep_row()
                 self._record()
+            self.frames.begin(self.simulation)
             return self._to_end()
 
     @contextmanager
     def _closing(self):
         try:
-            yield
+            with self.frames.held():
+                yield
         except BaseException:  # report this error, not one of closing the history
             with suppress(FileError):
                 self._record()
@@ -198,9 +185,10 @@ class Runner:
                 while simulation.time < output:
                     if self.stopped_by:
                         self._stop(self.stopped_by[0])
-                    simulation.proceed(output, most)
+                    simulation.proceed(output, most, self.frames.due)
                     if self.config.problem.has_diagnostics:
                         self._record()
+                    self.frames.record(simulation)
                     self._heed(self.progress.step(simulation))
                 self._write_checkpoint()
         except NumericalError as error:

@@ -164,13 +164,14 @@ class Simulation:
         self.renew_lists(dt)
         self.complete(dt, until if lands else self.time + dt)
 
-    def proceed(self, until: float, most: int) -> None:
+    def proceed(self, until: float, most: int, pause: float = np.inf) -> None:
         """Take one or more steps, up to `most`, which end at `until` or earlier.
 
-        Keeps the rows of the history of valid steps for `take_rows`. Raises NumericalError.
+        `pause` changes no step: the step that reaches this time is the last one taken. Keeps
+        the rows of the history of valid steps for `take_rows`. Raises NumericalError.
         """
         if self._steps.may_begin():
-            self._steps.take(until, most)
+            self._steps.take(until, most, pause)
         else:
             self.advance(until)
             self.keep_row()

@@ -18,21 +18,34 @@ CHUNK = 10_000
 
 
 class Plane(NamedTuple):
-    """Pixels of a rectangle along x and y; in 3-D it lies at `height` on the z axis."""
+    """Pixels of a rectangle along two axes; in 3-D it lies at `height` on the third axis."""
 
     low: np.ndarray  # (2,) corner
     high: np.ndarray  # (2,) opposite corner
-    shape: tuple[int, int]  # pixels along x and y
-    height: float | None = None
+    shape: tuple[int, int]  # pixels along both axes
+    height: float | None = None  # None in 2-D, and for projections along the third axis
+    axes: tuple[int, int] = (0, 1)  # horizontal and vertical
 
     @classmethod
-    def through_centre(cls, box: np.ndarray, pixels: int) -> "Plane":
+    def through_centre(
+        cls, box: np.ndarray, pixels: int, axes: tuple[int, int] = (0, 1)
+    ) -> "Plane":
         """All of a 2-D `box` (D, 2) or the middle of a 3-D one; `pixels` on the longer side."""
-        low, high = box[:2, 0], box[:2, 1]
+        low, high = box[axes, 0], box[axes, 1]
         sides = high - low
         shape = np.maximum(1, np.round(pixels * sides / sides.max())).astype(int)
-        height = float(box[2].mean()) if len(box) == 3 else None
-        return cls(low, high, (int(shape[0]), int(shape[1])), height)
+        height = float(box[3 - sum(axes)].mean()) if len(box) == 3 else None
+        return cls(low, high, (int(shape[0]), int(shape[1])), height, axes)
+
+    @property
+    def third(self) -> int:
+        """The axis across the plane of a 3-D run."""
+        return 3 - sum(self.axes)
+
+    @property
+    def step(self) -> np.ndarray:
+        """(2,) sides of a pixel."""
+        return (self.high - self.low) / np.array(self.shape)
 
     @property
     def extent(self) -> tuple[float, float, float, float]:
@@ -66,8 +79,8 @@ def at_points(
             share = weight[j] * kernel.w((0,) * D, q)
             for total, value in zip(sums, values, strict=True):
                 total += np.bincount(i, share * value[j], total.size)
-    means = _means(sums[:-1], sums[-1])
-    return means[: len(scalars)], means[len(scalars) :]
+    found = means(sums[:-1], sums[-1])
+    return found[: len(scalars)], found[len(scalars) :]
 
 
 def onto_plane(
@@ -77,8 +90,8 @@ def onto_plane(
 
     NaN where the sum of V W is at most `least`; it is 1 inside matter and 1/2 at a plane surface.
     """
-    means, cover = with_cover(values, particles, domain, kernel, plane)
-    return np.where(cover > least, means, np.nan)
+    found, cover = with_cover(values, particles, domain, kernel, plane)
+    return np.where(cover > least, found, np.nan)
 
 
 def with_cover(
@@ -90,20 +103,23 @@ def with_cover(
     """
     values = np.ascontiguousarray(values, dtype=np.float64)
     H, weight = particles.support, _weight(particles)
-    step = (plane.high - plane.low) / np.array(plane.shape)
+    step = plane.step
     first = plane.low + step / 2
     sums = np.zeros((len(values), plane.shape[1], plane.shape[0]))
     total = np.zeros(sums.shape[1:])
     for sign, offset in zip(*domain.images_within(H.max()), strict=True):
         image = sign[:, None] * particles.position + offset[:, None]
-        depth = image[2] - plane.height if particles.dimension == 3 else np.zeros(H.size)
-        near = np.flatnonzero(_reaches(image[:2], depth, H, plane))
+        depth = np.zeros(H.size)
+        if particles.dimension == 3:
+            depth = image[plane.third] - plane.height
+        flat = image[plane.axes, :]
+        near = np.flatnonzero(reaches(flat, depth, H, plane))
         if near.size:
             _scatter(
-                kernel, (0,) * particles.dimension, image[:2, near], depth[near], H[near],
+                kernel, (0,) * particles.dimension, flat[:, near], depth[near], H[near],
                 weight[near], values[:, near], first, step, total, sums,
             )  # fmt: skip
-    return _means(sums, total), total * normalisation(kernel, (0,) * particles.dimension)
+    return means(sums, total), total * normalisation(kernel, (0,) * particles.dimension)
 
 
 def _weight(particles) -> np.ndarray:
@@ -111,13 +127,14 @@ def _weight(particles) -> np.ndarray:
     return particles.mass / (particles.density * particles.support**particles.dimension)
 
 
-def _means(sums: np.ndarray, total: np.ndarray) -> np.ndarray:
+def means(sums: np.ndarray, total: np.ndarray) -> np.ndarray:
     """sums (F, …) over the sum of weights (…), NaN where that is zero."""
     with np.errstate(invalid="ignore"):
         return np.where(total > 0.0, sums / total, np.nan)
 
 
-def _reaches(position, depth, H, plane: Plane) -> np.ndarray:
+def reaches(position, depth, H, plane: Plane) -> np.ndarray:
+    """Whether kernels at (2, N) positions along the axes of the plane reach it, (N,)."""
     low, high = plane.low[:, None], plane.high[:, None]
     beside = np.all((position + H > low) & (position - H < high), axis=0)
     return beside & (np.abs(depth) < H)

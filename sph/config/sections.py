@@ -31,6 +31,14 @@ class Output(Section):
 
     restart: ClassVar[str | None] = "free"
     interval: float = Field(gt=0, description="time between checkpoints, in code units")
+    frames: Annotated[int, Field(ge=2)] | None = Field(
+        None,
+        description="number of frames for movies, evenly spaced from t = 0 to time.end: small "
+        "files with the fields that pictures show, in single precision; none if not given. A frame "
+        "shows the end of the step that first reaches its time, so frames change no step; steps "
+        "longer than the spacing make fewer frames",
+        examples=[100],
+    )
 
 
 def _absolute(path: str) -> str:

@@ -248,6 +248,18 @@ def holding(directories: dict[Path, int]) -> Iterator[None]:
         _held.update(before)
 
 
+@contextlib.contextmanager
+def holding_directory(path: Path) -> Iterator[None]:
+    """Within the block, hold the directory `path` too. Raises FileError if it cannot be opened."""
+    with explained(f"cannot open {path}"):
+        descriptor = os.open(path, os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW)
+    try:
+        with holding({path: descriptor}):
+            yield
+    finally:
+        os.close(descriptor)
+
+
 def check_in_place(path: Path, descriptor: int) -> None:
     """Raise FileError if `path` is no longer the file or directory open as `descriptor`."""
     try:

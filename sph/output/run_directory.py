@@ -28,6 +28,7 @@ from sph.output.files import (
     replacing,
     write_text,
 )
+from sph.output.frames import Frames
 from sph.output.json_text import json_text
 from sph.shell_words import quoted
 from sph.summary import Summary, of_json
@@ -112,6 +113,10 @@ class RunDirectory:
     def offenders(self) -> Path:
         """Path of the file in which a failed run stores the particles at which it failed."""
         return self.path / "offenders.h5"
+
+    @property
+    def frames(self) -> Frames:
+        return Frames(self.path / "frames")
 
     @property
     def figures(self) -> Path:
@@ -248,6 +253,23 @@ class RunDirectory:
         """
         return _json_object(self.summary)
 
+    def is_running(self) -> bool | None:
+        """Return whether a process has locked the directory; None on file systems without locks."""
+        try:
+            descriptor = os.open(self._checkpoint_directory, os.O_RDONLY | os.O_DIRECTORY)
+        except OSError:  # moved or removed
+            return False
+        try:
+            fcntl.flock(descriptor, fcntl.LOCK_SH | fcntl.LOCK_NB)
+        except BlockingIOError:
+            return True
+        except OSError:
+            return None
+        else:
+            return False
+        finally:
+            os.close(descriptor)
+
     @contextmanager
     def alone(self) -> Iterator[None]:
         """Lock the directory within the block. Raises FileError if another process has locked it.
@@ -287,6 +309,7 @@ class RunDirectory:
         files = (self.history, self.summary, self.offenders, self.problem, self.relaxation)
         for path in (*files, *self.checkpoints()):
             path.unlink(missing_ok=True)
+        self.frames.drop_after(-1)
         self.write_config("")  # keeps MARK, so that this remains a run directory
 
     def _ended_at_once(self) -> bool:

@@ -70,8 +70,11 @@ class Steps:
             self._suits = False
         return self._suits
 
-    def take(self, until: float, most: int) -> None:
-        """Take up to `most` steps, which end at `until` or earlier. Raises NumericalError."""
+    def take(self, until: float, most: int, pause: float) -> None:
+        """Take up to `most` steps, which end at `until` or earlier. Raises NumericalError.
+
+        The step that reaches `pause` is the last.
+        """
         s = self._simulation
         most = min(most, s.watchdog.steps_to_mark(s.step))
         if self._filled + most > MOST:
@@ -81,6 +84,7 @@ class Steps:
         begun, first, end = time.perf_counter(), 0, self._filled + most
         while True:
             step = s.step
+            self._fixed[driver.PAUSE] = pause
             self._fixed[driver.LONGEST] = LONGEST + begun - time.perf_counter()
             reason = self._call(until, now, end, first)
             if reason != driver.STALE:

@@ -37,11 +37,12 @@ NOW, LIMIT, GIVEN, LIMITED, REACH, LENGTH, UNTIL, NEXT = range(8)
 
 # Entries of `fixed`, numbers that do not change within a call. BOX: volume of a box that gas fills,
 # 0 for others; STEP: number of steps before the call; LOWEST: bound of the internal energy;
-# LONGEST: seconds after which to return.
+# PAUSE: time from which on to return after the step that reached it; LONGEST: seconds after which
+# to return.
 (
     STOP, SKIN, COURANT, END, MAX_DRIFT, BASE_ENERGY, BASE_SCALE, ADDED, BOX, STEP, LOWEST,
-    LONGEST,
-) = range(12)  # fmt: skip
+    PAUSE, LONGEST,
+) = range(13)  # fmt: skip
 
 # What the result of a call is: energy injected (GIVES), motion since lists were built (MOVES),
 # whether the first pass found all supports (FINDS), number of supports limited by max_support
@@ -151,7 +152,7 @@ def take(calls, places, words, numbers, fixed, momentum, now, rows, spent, clock
         row[WALL] = 1e-9 * (before - begun)
         if is_doubtful or not _passes_checks(fixed, fixed[STEP] + steps, row):
             return DOUBTFUL, steps, swapped
-        if row[WALL] > fixed[LONGEST]:
+        if row[WALL] > fixed[LONGEST] or now[NOW] >= fixed[PAUSE]:
             break
     return PAUSED, steps, swapped
 

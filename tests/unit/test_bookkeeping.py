@@ -289,7 +289,13 @@ def closing(session, monkeypatch):
 
 def test_summary_covers_all_rows_with_status_reason_and_lineage(closing):
     closing._close("failed", "it broke")
-    given = {"status": "failed", "reason": "it broke", "lineage": ("one line",), "rows": 1}
+    given = {
+        "status": "failed",
+        "reason": "it broke",
+        "lineage": ("one line",),
+        "relaxation": None,
+        "rows": 1,
+    }
     assert closing.told == [("summary", given)]
     assert len(closing.written) == 1
 
@@ -334,7 +340,7 @@ def test_progress_shows_each_step_of_session(closing, simulation, monkeypatch):
     closing.config = CONFIG.override(["time.end=0.5", "output.interval=0.125"])
     simulation.scene.step_bounds = SimpleNamespace(courant=CONFIG.physics.C)
 
-    def proceed(until, most):
+    def proceed(until, most, pause):
         assert most == 1  # of a problem with diagnostics
         simulation.time, simulation.step = min(until, simulation.time + 0.0625), simulation.step + 1
         simulation.keep_row()

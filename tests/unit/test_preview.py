@@ -33,6 +33,15 @@ def figure(text, pattern):
     return float(re.search(pattern.replace("#", r"([0-9.e+-]*\d)"), text)[1])
 
 
+def test_preview_counts_outputs():
+    made = configuration.from_text(TUBE)
+    assert preview.describe(made).endswith("Output: 5 checkpoints.")
+    assert preview._frames(made) == ""
+    assert (
+        preview._frames(made.override(["output.frames=9"])) == ", and 9 frames, at most one a step"
+    )
+
+
 def test_preview_lists_parts_in_and_left_out():
     text = preview.describe(configuration.from_text(TUBE))
     inside, outside = re.search(r"Compiled in:\n(.*)Left out:\n(.*)Particles", text, re.S).groups()

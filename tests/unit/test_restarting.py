@@ -300,13 +300,13 @@ def test_unused_file_settings_are_noted_except_threads(place):
 
 def test_restart_into_new_directory_copies_history_and_checkpoints(place, tmp_path):
     path = place.checkpoint_path(1)
-    target, number = restarting._place_to_go_on(place, path, tmp_path / "new")
+    target, number = restarting._place_to_go_on(place, path, 0, tmp_path / "new")
     assert number == 1
     assert [one.read_text() for one in target.checkpoints()] == ["0", "1"]
     assert target.history.read_text() == "step,t\n"
     for directory in (None, place.path):
-        assert restarting._place_to_go_on(place, path, directory) == (place, 1)
-    target, number = restarting._place_to_go_on(None, path, tmp_path / "lone")
+        assert restarting._place_to_go_on(place, path, 0, directory) == (place, 1)
+    target, number = restarting._place_to_go_on(None, path, 0, tmp_path / "lone")
     assert (number, [one.read_text() for one in target.checkpoints()]) == (0, ["1"])
     assert not target.history.exists()
 

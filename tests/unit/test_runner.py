@@ -22,7 +22,7 @@ from sph.errors import ConfigError, FileError, NumericalError, Stopped
 from sph.output import checkpoint as checkpoints
 from sph.output.history import History
 from sph.output.run_directory import RunDirectory, find
-from sph.runner import output_times
+from sph.output.times import output_times
 from sph.summary import Conservation, Cost, Nearest, Norms, Session, Summary, of_json
 from sph.totals import Baseline
 

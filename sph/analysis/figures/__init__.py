@@ -7,6 +7,7 @@ from matplotlib.figure import Figure
 
 from sph.analysis import truth
 from sph.analysis.figures import history, maps, profiles, style
+from sph.analysis.figures.main import main_picture, shows_profiles
 from sph.analysis.figures.sources import Source, State, find_source, labels
 from sph.analysis.figures.view import View, figure, states_at
 from sph.errors import ConfigError
@@ -51,11 +52,6 @@ def draw(
         return [_save(comparison(states, labels(found)), Path(target))]
 
 
-def main_picture(state: State) -> Figure:
-    """Profiles beside the exact solution where there is one, else a map."""
-    return profiles.single(state) if _shows_profiles(state) else maps.single(state)
-
-
 def comparison(states: Sequence[State], names: Sequence[str]) -> Figure:
     """Profiles over each other, or maps side by side. Raises ConfigError where they do not fit."""
     kinds = {_kind(state) for state in states}
@@ -64,19 +60,15 @@ def comparison(states: Sequence[State], names: Sequence[str]) -> Figure:
             f"one picture cannot compare {' with '.join(sorted(kinds))}.\n"
             "Try: runs of one problem, or leave out -o for pictures of each."
         )
-    compared = profiles.compared if _shows_profiles(states[0]) else maps.compared
+    compared = profiles.compared if shows_profiles(states[0]) else maps.compared
     return compared(states, names)
 
 
 def _kind(state: State) -> str:
-    if not _shows_profiles(state):
+    if not shows_profiles(state):
         return "maps"
     names = ", ".join(state.problem.profiles)
     return f"profiles of {names} {'over the radius' if state.is_radial else 'along x'}"
-
-
-def _shows_profiles(state: State) -> bool:
-    return state.dimension == 1 or (state.may_have_exact and state.problem.profiled)
 
 
 def _draw_own(source: Source) -> list[Path]:
@@ -93,7 +85,7 @@ def _draw_view(source: Source, target: Path | None, view: View, times: Sequence[
     if states[-1].dimension == 1 and view == View():
         picture, name = profiles.over_time(states), "profiles_at_times"
     else:
-        picture, name = figure(states, view), f"map_of_{view.field or maps.main_field(states[-1])}"
+        picture, name = figure(states, view), view.name_of(maps.main_field(states[-1]))
     directory = source.path.parent if source.run is None else source.run.figures
     return _save(picture, Path(target or directory / f"{name}.png"))
 
@@ -102,7 +94,7 @@ def _pictures(source: Source, run: RunDirectory):
     """(name, figure) of each picture of a run's set, one at a time to hold one in memory."""
     last = source.last()
     states = source.over_time(MOST_TIMES)
-    if _shows_profiles(last) or last.dimension == 3:
+    if shows_profiles(last) or last.dimension == 3:
         yield "profiles", profiles.single(last)
     if last.dimension > 1:
         yield "slice" if last.dimension == 3 else "map", maps.single(last)

@@ -38,18 +38,25 @@ def figure(
     """Energies, their drift, momentum, steps by what limited them, and the problem's diagnostics.
 
     `history` is that of `sph.output.history.read`; `theory` has what is said of its columns;
-    `config`, that of the run, has its units. Left out are diagnostics that are zero throughout, and
-    momentum that `mass`, the total, tells to be conserved to round-off: the title says so.
+    `config`, that of the run, has its units. Left out are diagnostics that are constant, and
+    momentum that `mass`, the total, tells to be conserved to round-off: the title says so, but for
+    zeros.
     """
     theory = theory or {}
     momentum = [name for name in history if name.startswith("momentum_")]
     shared = {*shared_columns(len(momentum)), *(name for name, *_ in ENERGIES)}
     further = [name for name in history if name not in shared and np.any(history[name] != 0.0)]
+    constant = [name for name in further if name not in theory and _is_constant(history[name])]
+    further = [name for name in further if name not in constant]
     change = max(float(np.ptp(history[name])) for name in momentum)
     is_conserved = change < ROUND_OFF * _momentum_scale(history, mass)
     if is_conserved:
-        title += f"\nmomentum is conserved to round-off, within {style.number(change)}"
-    picture, panels = _panels(4 - is_conserved + len(further))
+        size = f"{style.number(change)} {_unit('momentum_x', config)}".rstrip()
+        title += f"\nmomentum is conserved to round-off, within {size}"
+    for name in constant:
+        value = f"{style.number(history[name][-1])} {_unit(name, config)}".rstrip()
+        title += f"\n{_words(name)} is {value} throughout"
+    picture, panels = _panels(4 - is_conserved + len(further), title.count("\n"))
     free = iter(panels)
     _energies(next(free), history, theory)
     _drift(next(free), history)
@@ -71,12 +78,28 @@ def figure(
     return picture
 
 
+def _is_constant(values: np.ndarray) -> bool:
+    """Whether values change by round-off at most."""
+    return bool(np.ptp(values) <= ROUND_OFF * np.abs(values).max())
+
+
+def _words(name: str) -> str:
+    """What the column of a diagnostic is called."""
+    return LABELS.get(name, name.replace("_", " "))
+
+
+def _unit(name: str, config: Config | None) -> str:
+    known = meanings.of_column(config, name) if config else None
+    return style.unit_symbol(known.unit, config.units) if known and config else ""
+
+
 def _add_units(panels, columns: Sequence[str], config: Config) -> None:
     """Add its unit to the vertical axis of each panel. columns: one shown by each."""
     for panel, name in zip(panels, columns, strict=True):
         known = meanings.of_column(config, name)
         if known is not None:
-            panel.set_ylabel(style.labelled(panel.get_ylabel(), known.unit, config.units))
+            label = style.labelled(panel.get_ylabel(), known.unit, config.units)
+            panel.set_ylabel(style.in_two_lines(label))
 
 
 def _momentum_scale(history, mass: float) -> float:
@@ -93,10 +116,13 @@ def _legend_above(panel, **settings) -> None:
     )  # fmt: skip
 
 
-def _panels(count: int):
-    """A figure and `count` panels in rows of two; an odd one at the end is twice as wide."""
+def _panels(count: int, lines: int):
+    """A figure and `count` panels in rows of two; an odd one at the end is twice as wide.
+
+    lines: of the title, after the first.
+    """
     rows = (count + 1) // 2
-    picture = style.new_figure(7.2, 2.6 * rows + 0.4)
+    picture = style.new_figure(7.2, 2.6 * rows + 0.4 + 0.25 * lines)
     grid = picture.add_gridspec(rows, 2)
     cells = [grid[i // 2, i % 2] for i in range(count)]
     if count % 2:
@@ -153,6 +179,6 @@ def _diagnostic(panel, history, name: str, theory: np.ndarray | None) -> None:
     if theory is not None:
         panel.plot(history["t"], theory, "--", color="black", label="theory")
         _legend_above(panel)
-    panel.set_ylabel(LABELS.get(name, name.replace("_", " ")))
+    panel.set_ylabel(_words(name))
     if np.all(values > 0.0) and values.max() > DECADE * values.min():
         panel.set_yscale("log")

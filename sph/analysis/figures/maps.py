@@ -1,4 +1,4 @@
-"""Maps of 2-D runs and slices through the middle of 3-D runs, interpolated with the kernel."""
+"""Maps of 2-D runs, slices and projections of 3-D runs, interpolated with the kernel."""
 
 import textwrap
 from collections.abc import Iterable, Sequence
@@ -10,6 +10,7 @@ from matplotlib.figure import Figure
 from sph.analysis.figures import style
 from sph.analysis.figures.sources import State
 from sph.analysis.interpolate import Plane, with_cover
+from sph.analysis.projection import along_sight
 
 PIXELS = 512  # on the longer side
 PIXELS_OF_MANY = 320
@@ -34,8 +35,8 @@ def single(state: State) -> Figure:
         figure.colorbar(image, ax=panel, pad=0.02, extend=_extends(image))
         _outline(panel, state, plane)
         panel.set_title(state.labelled(style.label(name), name))
-    _label_axes(panels, 2, _axes(state))
-    figure.suptitle(f"{state.title}, {state.when}{_where(plane)}")
+    _label_axes(panels, 2, _axes(state, plane))
+    figure.suptitle(f"{state.title}, {state.when}{_where(plane, state)}")
     return figure
 
 
@@ -88,11 +89,16 @@ def plane_of(state: State, pixels: int) -> Plane:
 
 def common_plane(states: Iterable[State], pixels: int) -> Plane:
     """The plane that holds `plane_of` of all states, which are read one by one."""
+    return _plane(*common_frame(states), pixels)
+
+
+def common_frame(states: Iterable[State]) -> tuple[np.ndarray, State]:
+    """(D, 2) the part of space that holds the gas of all states, and the last state."""
     frames = []
     for state in states:
         frames.append(_frame(state))
     low, high = np.array(frames)[..., 0].min(axis=0), np.array(frames)[..., 1].max(axis=0)
-    return _plane(np.stack([low, high], axis=1), state, pixels)
+    return np.stack([low, high], axis=1), state
 
 
 def _frame(state: State) -> np.ndarray:
@@ -127,9 +133,31 @@ class _Map(NamedTuple):
 def drawn(state: State, plane: Plane, label: str, what: str, field: str | None = None) -> _Map:
     """The map of `field`, by default the main field, on `plane`."""
     field = field or main_field(state)
-    (values,), opacity = _images(state, [field], plane)
-    quantity = state.labelled(style.label(field), field)
-    return _Map(values, opacity, field, plane, label, what + _where(plane), quantity, _axes(state))
+    if state.dimension == 3 and plane.height is None:
+        field, values, quantity = _projected(state, field, plane)
+        opacity = None
+    else:
+        (values,), opacity = _images(state, [field], plane)
+        quantity = state.labelled(style.label(field), field)
+    what += _where(plane, state)
+    return _Map(values, opacity, field, plane, label, what, quantity, _axes(state, plane))
+
+
+def _projected(state: State, field: str, plane: Plane) -> tuple[str, np.ndarray, str]:
+    """Name, (ny, nx) values and label of a field along the line of sight."""
+    if field == "density":
+        _, column = along_sight(
+            np.zeros((0, state.particles.number)),
+            state.particles,
+            state.domain,
+            state.kernel,
+            plane,
+        )
+        label = state.labelled(style.label("column_density"), "column_density")
+        return "column_density", np.where(column > 0.0, column, np.nan), label
+    values = state.scalar(field)[None]
+    (means,), _ = along_sight(values, state.particles, state.domain, state.kernel, plane)
+    return field, means, state.labelled(f"{style.label(field)}, mean weighted by mass", field)
 
 
 def side_by_side(maps: Sequence[_Map], scale=None) -> Figure:
@@ -222,8 +250,8 @@ def _arrangement(plane: Plane, count: int, widest: float) -> tuple[int, float, f
     return columns, width, height
 
 
-def _axes(state: State) -> list[str]:
-    return [state.labelled(label, "x") for label in ("$x$", "$y$")]
+def _axes(state: State, plane: Plane) -> list[str]:
+    return [state.labelled(f"${'xyz'[axis]}$", "x") for axis in plane.axes]
 
 
 def _label_axes(panels, count: int, labels: Sequence[str], differ: bool = False) -> None:
@@ -239,6 +267,10 @@ def _label_axes(panels, count: int, labels: Sequence[str], differ: bool = False)
             panel.set_ylabel(labels[1])
 
 
-def _where(plane: Plane) -> str:
-    where = "" if plane.height is None else f", at $z$ = {plane.height:.4g}"
+def _where(plane: Plane, state: State) -> str:
+    where, name = "", f"${'xyz'[plane.third]}$"
+    if plane.height is not None:
+        where = f", at {name} = {plane.height:.4g} {state.units.symbol(1, 0, 0)}".rstrip()
+    elif state.dimension == 3:
+        where = f", projected along {name}"
     return where + (", not to scale" if _ratio(plane) != _drawn_ratio(plane) else "")

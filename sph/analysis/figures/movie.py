@@ -1,4 +1,4 @@
-"""Movies of runs: one frame for each checkpoint, all of one size and one scale of colours."""
+"""Movies of runs: pictures that share their size, scale of colours and axes."""
 
 import functools
 import importlib
@@ -11,17 +11,20 @@ from typing import BinaryIO
 import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colors import Normalize
+from matplotlib.figure import Figure
 from PIL import Image
 
-from sph.analysis.figures import maps, style
-from sph.analysis.figures.sources import Source, States, find_source
+from sph.analysis.figures import maps, profile_axes, profiles, style
+from sph.analysis.figures.sources import Source, State, States, find_source
 from sph.analysis.figures.view import View
 from sph.analysis.interpolate import Plane
-from sph.errors import ConfigError, FileError
+from sph.errors import ConfigError
 from sph.output.files import explained, refuse_link, replacing
 
 FORMATS = (".gif", ".mp4")
 COLOURS = 256  # of a gif
+
+Drawn = Callable[[States], Iterator[np.ndarray]]  # the pixels of the frames of these states
 
 
 def make(
@@ -29,27 +32,38 @@ def make(
 ) -> Path:
     """Write a movie of the run `source`; returns its path, by default figures/movie.gif.
 
-    Checkpoints are read three times, one at a time: for the part of the domain that all share, for
-    the scale of colours, and for the frames. per_second: frames. dpi: by default style.DPI.
+    Frames of the run or, without these, checkpoints are read three times, one at a time: for the
+    part of the domain that all share, for the scale of colours, and for the pictures; those of 1-D
+    runs twice. per_second: pictures. dpi: by default style.DPI.
     Raises ConfigError for other suffixes than FORMATS, for .mp4 without imageio-ffmpeg and for
     views that cannot be drawn, FileError for what is missing, damaged or cannot be written.
     """
     write = _writer(Path(target)) if target else _write_gif
     found = find_source(Path(source))
-    if not found.is_run or len(found.checkpoints) < 2:
-        raise FileError(
-            f"{source}: a movie needs a run directory with two checkpoints or more.\n"
-            "Try: a run with a smaller output.interval."
-        )
-    states = States(found.checkpoints)
+    states = found.for_movie()
     with style.paper():
-        view.check(found.last())
-        plane = view.plane(states, maps.PIXELS)
-        scale = _scale(states, view, plane)
+        picture = _pictures(states, view, found.last())
         path = Path(target) if target else _in_figures(found)
+        drawn = functools.partial(_frames, drawn=picture, dpi=dpi or style.DPI)
         with replacing(path) as unfinished:
-            write(_frames(states, view, plane, scale, dpi or style.DPI), unfinished, per_second)
+            write(drawn, states, unfinished, per_second)
     return path
+
+
+def _pictures(states: States, view: View, last: State) -> Callable[[State], Figure]:
+    """What draws a state as a frame of the movie. Raises ConfigError."""
+    if last.dimension == 1 and view == View():
+        axes = profile_axes.of_movie(states)
+        return lambda state: profiles.frame(state, axes)
+    view.check(last)
+    plane = view.plane(states, maps.PIXELS)
+    scale = _scale(states, view, plane)
+
+    def picture(state: State) -> Figure:
+        one = maps.drawn(state, plane, state.when, state.title, view.field)
+        return maps.side_by_side([one], scale)
+
+    return picture
 
 
 def _scale(states: States, view: View, plane: Plane) -> Normalize:
@@ -66,11 +80,10 @@ def _scale(states: States, view: View, plane: Plane) -> Normalize:
     return style.scale(np.array([*ends, *np.repeat(middle, 2)]))
 
 
-def _frames(states: States, view: View, plane: Plane, scale, dpi: int) -> Iterator[np.ndarray]:
+def _frames(states: States, drawn: Callable[[State], Figure], dpi: int) -> Iterator[np.ndarray]:
     """(height, width, 3) bytes of each frame; sides are even, as codecs of video ask."""
     for state in states:
-        one = maps.drawn(state, plane, state.when, state.title, view.field)
-        picture = maps.side_by_side([one], scale)
+        picture = drawn(state)
         picture.set_dpi(dpi)
         canvas = FigureCanvasAgg(picture)
         canvas.draw()
@@ -99,22 +112,26 @@ def _writer(target: Path) -> Callable:
     return functools.partial(_write_mp4, ffmpeg)
 
 
-def _write_gif(frames: Iterator[np.ndarray], file: BinaryIO, per_second: int) -> None:
-    """One palette for all frames, of the first and the last, so that no colour flickers."""
-    images = [Image.fromarray(pixels) for pixels in frames]
-    both = Image.new("RGB", (images[0].width, 2 * images[0].height))
-    both.paste(images[0], (0, 0))
-    both.paste(images[-1], (0, images[0].height))
+def _write_gif(drawn: Drawn, states: States, file: BinaryIO, per_second: int) -> None:
+    """One palette for all frames, of the first and the last, so that no colour flickers.
+
+    Pillow keeps all frames in memory, a byte for each pixel.
+    """
+    both = Image.fromarray(np.concatenate([*drawn(states.ends())]))
     palette = both.quantize(COLOURS)
-    first, *others = (one.quantize(palette=palette, dither=Image.Dither.NONE) for one in images)
+    first, *others = (
+        Image.fromarray(pixels).quantize(palette=palette, dither=Image.Dither.NONE)
+        for pixels in drawn(states)
+    )
     first.save(
         file, format="gif", save_all=True, append_images=others, loop=0, optimize=False,
         duration=round(1000 / per_second),
     )  # fmt: skip
 
 
-def _write_mp4(ffmpeg, frames: Iterator[np.ndarray], file: BinaryIO, per_second: int) -> None:
+def _write_mp4(ffmpeg, drawn: Drawn, states: States, file: BinaryIO, per_second: int) -> None:
     """The encoder writes files only: to one of its own, which is copied."""
+    frames = drawn(states)
     first = next(frames)
     height, width = first.shape[:2]
     with tempfile.TemporaryDirectory() as directory:

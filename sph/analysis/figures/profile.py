@@ -1,5 +1,6 @@
 """One state as a function of one coordinate, x or the radius, beside its exact solution."""
 
+import textwrap
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -9,6 +10,7 @@ from sph.analysis import truth
 from sph.analysis.figures.sources import State
 
 EXACT_POINTS = 2000
+LONGEST_TITLE = 90  # letters in a line
 # Exact solutions whose spread is within this range of their mean are drawn as deviations from the
 # mean: above, the signal is seen beside errors of the mean; below, it is round-off.
 SMALL_SIGNAL = (1e-9, 0.01)
@@ -79,6 +81,18 @@ def has_small_signal(profiles: Sequence[Profile], name: str) -> bool:
         if not low < np.ptp(values) < high:
             return False
     return True
+
+
+def without_exact(left_out: Sequence[str | None]) -> str:
+    """Lines for a title that say why an exact solution that the problem has is not drawn.
+
+    left_out: one reason a state, None where the solution is drawn or the problem has none.
+    """
+    which = "" if len(left_out) == 1 else "in part "
+    return "".join(
+        "\n" + textwrap.fill(f"{which}without the exact solution: {reason}", LONGEST_TITLE)
+        for reason in sorted({reason for reason in left_out if reason})[:1]
+    )
 
 
 def _reach(problem) -> float:

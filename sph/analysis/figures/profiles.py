@@ -1,6 +1,5 @@
 """Profiles of the four fields that a problem names, along x or the radius."""
 
-import textwrap
 from collections.abc import Iterable, Sequence
 
 import numpy as np
@@ -8,25 +7,19 @@ from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 
 from sph.analysis.figures import style
-from sph.analysis.figures.profile import SMALL_SIGNAL, Profile, has_small_signal, profile
+from sph.analysis.figures.profile import (
+    SMALL_SIGNAL,
+    Profile,
+    has_small_signal,
+    profile,
+    without_exact,
+)
+from sph.analysis.figures.profile_axes import MovieAxes, axis_of_profiles
 from sph.analysis.figures.sources import State
 
-LONGEST_TITLE = 90  # letters in a line
 MOST_BINS = 100
 # A vector file with more dots than this is slow to open, so they become pixels in it.
 MOST_VECTOR_DOTS = 2000
-
-
-def _without_exact(left_out: Sequence[str | None]) -> str:
-    """Lines for a title that say why an exact solution that the problem has is not drawn.
-
-    left_out: one reason a state, None where the solution is drawn or the problem has none.
-    """
-    which = "" if len(left_out) == 1 else "in part "
-    return "".join(
-        "\n" + textwrap.fill(f"{which}without the exact solution: {reason}", LONGEST_TITLE)
-        for reason in sorted({reason for reason in left_out if reason})[:1]
-    )
 
 
 def single(state: State) -> Figure:
@@ -56,23 +49,37 @@ def over_time(states: Iterable[State]) -> Figure:
         labels.append(state.when)
         left_out.append(state.left_out if state.may_have_exact else None)
     return _figure(
-        profiles, labels, style.sequence(len(labels)), state.title + _without_exact(left_out),
+        profiles, labels, style.sequence(len(labels)), state.title + without_exact(left_out),
         state, [{}] * len(labels),
     )  # fmt: skip
+
+
+def frame(state: State, axes: MovieAxes) -> Figure:
+    """One state of a movie, with the axes of all its frames."""
+    reason = without_exact([state.left_out if state.may_have_exact else None])
+    # empty lines keep the panels of all frames in one place
+    filled = reason + "\n" * (axes.reason_lines - reason.count("\n"))
+    title = f"{state.title}, {state.when}{filled}"
+    return _figure(
+        [profile(state)], ["SPH"], style.colours(1), title, state, [state.errors()], axes
+    )
 
 
 def _of_runs(states: Sequence[State], labels, title: str) -> Figure:
     left_out = [state.left_out if state.may_have_exact else None for state in states]
     return _figure(
         [profile(state) for state in states], labels, style.colours(len(states)),
-        title + _without_exact(left_out), states[0], [state.errors() for state in states],
+        title + without_exact(left_out), states[0], [state.errors() for state in states],
     )  # fmt: skip
 
 
-def _figure(profiles: Sequence[Profile], labels, colours, title: str, state, errors) -> Figure:
+def _figure(
+    profiles: Sequence[Profile], labels, colours, title: str, state, errors,
+    axes: MovieAxes | None = None,
+) -> Figure:  # fmt: skip
     """A panel for each of the problem's four fields; `errors` by field, one a profile.
 
-    state: one of those drawn, which has the problem and the units.
+    state: one of those drawn, which has the problem and the units; axes: those of a movie.
     """
     figure = style.new_figure(7.2, 5.8)
     panels = dict(zip(state.problem.profiles, figure.subplots(2, 2, sharex=True).flat, strict=True))
@@ -80,13 +87,15 @@ def _figure(profiles: Sequence[Profile], labels, colours, title: str, state, err
     in_order = style.sequence(len(profiles)) == colours
     for name, panel in panels.items():
         shown, label = list(profiles), style.label(name)
-        if is_small := has_small_signal(profiles, name):
+        is_small = name in axes.less_mean if axes else has_small_signal(profiles, name)
+        if is_small:
             shown, label = (
                 [one.less_means(name) for one in profiles],
                 f"{style.SYMBOLS[name]} less its mean",
             )
-        panel.set_ylabel(state.labelled(label, name))
-        _set_scale(panel, shown, name)
+        panel.set_ylabel(style.in_two_lines(state.labelled(label, name)))
+        panel.margins(x=0.02)
+        (axes.fields[name] if axes else axis_of_profiles(shown, name)).apply(panel)
         drawn = [
             _particles(panel, one, name, colour, alone)
             for one, colour in zip(shown, colours, strict=True)
@@ -96,7 +105,12 @@ def _figure(profiles: Sequence[Profile], labels, colours, title: str, state, err
             for one, colour in zip(shown, colours, strict=True)
             if name in one.exact
         ]
-        _note(panel, name, drawn, errors, profiles if is_small else [])
+        notes = _notes(name, drawn, errors, profiles if is_small else [])
+        if axes:  # above the panel, where a note cannot move from frame to frame
+            panel.set_xlim(axes.coordinate)
+            panel.set_title(notes[0][1].replace("\n", ", ") if notes else " ", loc="right")
+        elif notes:
+            panel.legend(*zip(*notes, strict=True), loc="best", markerscale=2.0, handletextpad=0.4)
     for panel in list(panels.values())[2:]:
         symbol = profiles[0].symbol
         panel.set_xlabel(state.labelled(style.AXES[symbol], symbol))
@@ -108,30 +122,6 @@ def _figure(profiles: Sequence[Profile], labels, colours, title: str, state, err
         ncols=7 if max(map(len, labels)) < 15 else 2, columnspacing=1.4, handletextpad=0.4,
     )  # fmt: skip
     return figure
-
-
-def _set_scale(panel, profiles: Sequence[Profile], name: str) -> None:
-    """Limits; logarithmic where a peak or a large step would press all the rest to the floor."""
-    values = np.concatenate([one.fields[name] for one in profiles])
-    exact = np.concatenate([one.exact.get(name, values[:0]) for one in profiles])
-    panel.margins(x=0.02)
-    if values.min() > 0.0 and _spans_decades(values):
-        # the exact blast is infinitely hot at its centre: the particles set the limits
-        panel.set_yscale("log")
-        panel.set_ylim(values.min() / 3.0, values.max() * 3.0)
-        return
-    values = np.concatenate([values, exact[np.isfinite(exact)]])
-    low, high = values.min(), values.max()
-    # what is uniform is shown as a line, not as its round-off
-    margin = max(0.06 * (high - low), 1e-3 * max(abs(low), abs(high))) or 1.0
-    panel.set_ylim(low - margin, high + margin)
-
-
-def _spans_decades(values: np.ndarray) -> bool:
-    """Whether there is a peak far above the median, or a step of three decades in the middle."""
-    largest = values.max()
-    is_high, is_low = values > 0.5 * largest, values < 1e-3 * largest
-    return largest > 100.0 * np.median(values) or min(is_high.mean(), is_low.mean()) > 0.4
 
 
 def _darker(colour) -> tuple[float, ...]:
@@ -178,8 +168,8 @@ def _exact(panel, one: Profile, name: str, alone: bool, colour):
     return line
 
 
-def _note(panel, name: str, drawn, errors, off_mean: Sequence[Profile]) -> None:
-    """The error beside the mark of each state that has one; for `off_mean` that of the mean too."""
+def _notes(name: str, drawn, errors, off_mean: Sequence[Profile]) -> list[tuple]:
+    """Mark and error of each state that has one; for `off_mean` the error of the mean too."""
     noted = [
         (mark, rf"$L_1$ = {style.number(error[name])}")
         for mark, error in zip(drawn, errors, strict=True)
@@ -189,8 +179,7 @@ def _note(panel, name: str, drawn, errors, off_mean: Sequence[Profile]) -> None:
         mean, exact = one.means(name)
         if abs(off := mean / exact - 1.0) > SMALL_SIGNAL[0]:
             noted[k] = noted[k][0], f"{noted[k][1]}\nmean {100.0 * off:+.2g} %"
-    if noted:
-        panel.legend(*zip(*noted, strict=True), loc="best", markerscale=2.0, handletextpad=0.4)
+    return noted
 
 
 def binned(coordinate: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -9,9 +9,10 @@ import numpy as np
 
 from sph.analysis import errors, truth
 from sph.analysis.figures import style
+from sph.config import Config
 from sph.domain import Domain
 from sph.errors import FileError
-from sph.output import checkpoint, same_run
+from sph.output import checkpoint, frames, same_run
 from sph.output.run_directory import RunDirectory, find
 from sph.problems.support import uniaxial
 from sph.quantity import FIELDS
@@ -57,19 +58,43 @@ class Source:
         """The first, the last and others between them, at most `most`, as even as that allows."""
         return States([self.checkpoints[i] for i in evenly(len(self.checkpoints), most)])
 
+    def for_movie(self) -> "States":
+        """The frames of the run, if it has at least two, otherwise its checkpoints.
+
+        Raises FileError if there are fewer than two of these.
+        """
+        paths = self.run.frames.paths() if self.run and self.is_run else []
+        if len(paths) >= 2:
+            return States(paths, self.last().checkpoint.config)
+        if not self.is_run or len(self.checkpoints) < 2:
+            raise FileError(
+                f"{self.path}: a movie needs a run directory with two frames or checkpoints.\n"
+                "Try: a run with output.frames = 100."
+            )
+        return States(self.checkpoints)
+
 
 @dataclass(frozen=True)
 class States:
     """States of one run, read one by one: a large run's do not fit into memory together.
 
-    Iteration raises FileError, also for a checkpoint of another problem than the first.
+    paths: of checkpoints, or of frames if there is a `config`, that of the run. Iteration raises
+    FileError, also for a checkpoint of another problem than the first.
     """
 
     paths: Sequence[Path]
+    config: Config | None = None
+
+    def ends(self) -> "States":
+        """The first and the last state."""
+        return States([self.paths[0], self.paths[-1]], self.config)
 
     def __iter__(self) -> Iterator["State"]:
         first = None
         for path in self.paths:
+            if self.config is not None:
+                yield State(frames.read(path, self.config))
+                continue
             state = State(checkpoint.read(path))
             first = first or state.problem
             same_run.check_problem(path, state.problem, first)
@@ -142,9 +167,9 @@ def von_mises(S: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True)
 class State:
-    """A checkpoint as the pictures ask for it."""
+    """A checkpoint or a frame as the pictures ask for it."""
 
-    checkpoint: checkpoint.Checkpoint
+    checkpoint: checkpoint.Checkpoint | frames.Frame
 
     @property
     def particles(self):

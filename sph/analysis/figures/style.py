@@ -2,6 +2,7 @@
 
 import io
 import math
+import re
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, Literal
@@ -19,6 +20,7 @@ DPI = 180
 
 SYMBOLS = {
     "density": r"$\rho$",
+    "column_density": r"$\Sigma$",
     "velocity": r"$v$",
     "v_r": r"$v_r$",
     "v_phi": r"$v_\phi$",
@@ -32,15 +34,18 @@ SYMBOLS = {
 TITLES = {
     "v_r": "radial velocity", "v_phi": "rotation velocity", "plastic_strain": "plastic strain",
     "von_mises": "von Mises stress", "internal_energy": "specific internal energy",
-    "stress": "axial stress",
+    "stress": "axial stress", "column_density": "column density",
 }  # fmt: skip
 AXES = {"x": "$x$", "r": "distance from the centre $r$"}
 # Perceptually uniform, one a field, so that a reader does not take one for another.
 MAPS = {
     "density": "viridis", "pressure": "inferno", "internal_energy": "bone", "speed": "cividis",
-    "plastic_strain": "magma", "von_mises": "plasma",
+    "plastic_strain": "magma", "von_mises": "plasma", "column_density": "YlGnBu_r",
 }  # fmt: skip
 VACUUM = "0.85"
+LONGEST_LABEL = 27  # letters in a line beside the lowest panels, those of histories
+# Commands of mathematics: of fonts and braces, which take no width, and of one letter.
+WIDTHLESS, LETTER = re.compile(r"\\math[a-z]+|[${}^_]"), re.compile(r"\\([a-zA-Z]+|,)")
 MOST_DECADES = 4
 
 # Okabe & Ito (2008), the dark ones first.
@@ -83,16 +88,28 @@ def labelled(label: str, unit: str, units) -> str:
 
     unit: as quantities state it, such as "mass length^-D"; units: the table [units].
     """
+    symbol = unit_symbol(unit, units)
+    return f"{label} [{symbol}]" if symbol else label
+
+
+def unit_symbol(unit: str, units) -> str:
+    """The symbol of a unit, as mathematics; empty without physical units. See `labelled`."""
     powers = exponents(unit)
     if not units.are_given or not powers or not any(powers):
-        return label
+        return ""
     factors = [
         UNITS.get(name, rf"\mathrm{{{name}}}".replace(" ", r"\ "))
         + (f"^{{{power}}}" if power != 1 else "")
         for name, power in units.factors(*powers)
     ]
     product = r"\,".join(factors)
-    return f"{label} [${product}$]"
+    return f"${product}$"
+
+
+def in_two_lines(label: str) -> str:
+    """A label for a vertical axis: its unit is on a second line where one line is too long."""
+    is_long = len(LETTER.sub(" ", WIDTHLESS.sub("", label))) > LONGEST_LABEL
+    return label.replace(" [$", "\n[$") if is_long else label
 
 
 @contextmanager
@@ -145,11 +162,16 @@ def scale(values) -> Normalize:
         return Normalize(0.0, 1.0)
     low, high = float(finite.min()), float(finite.max())
     if low > 0.0 and (high > 1000.0 * low or high > 10.0 * float(np.median(finite))):
-        return LogNorm(max(low, high / 10.0**MOST_DECADES), high)
+        return LogNorm(lowest_of_log(low, high), high)
     if high - low <= 1e-6 * abs(high):  # uniform gas: do not magnify round-off
         margin = 0.1 * abs(high) or 1.0
         return Normalize(low - margin, high + margin)
     return Normalize(low, high)
+
+
+def lowest_of_log(low: float, high: float) -> float:
+    """The lower end of a logarithmic scale for values from `low` to `high`."""
+    return max(low, high / 10.0**MOST_DECADES)
 
 
 def label(name: str) -> str:

@@ -22,11 +22,18 @@ class View(NamedTuple):
     limits: tuple[float, float] | None = None  # of the scale of colours
     is_log: bool = False
     zoom: tuple[float, float, float, float] | None = None  # x from, to, y from, to
+    slice: tuple[int, float] | None = None  # axis across it, and where
+    projection: int | None = None  # axis along the line of sight
 
     def check(self, state: State) -> None:
         """Raise ConfigError if this view cannot be drawn of `state`."""
         if state.dimension == 1:
-            raise ConfigError("this run is 1-D: maps and movies need a 2-D or 3-D run.")
+            raise ConfigError(
+                "this run is 1-D, and has no maps.\n"
+                "Try: without --field, --range, --log, --zoom, --slice and --projection, for "
+                "profiles."
+            )
+        self._check_axes(state)
         needed = OF_SOLIDS.get(self.field or "")
         if needed and state.particles.get(needed) is None:
             raise ConfigError(
@@ -48,13 +55,49 @@ class View(NamedTuple):
                 "from, y to, the smaller number of each pair first."
             )
 
+    def _check_axes(self, state: State) -> None:
+        if self.slice is None and self.projection is None:
+            return
+        if state.dimension == 2:
+            raise ConfigError(
+                "this run is 2-D: --slice and --projection need a 3-D run.\n"
+                "Try: without them; the map shows the whole run."
+            )
+        if self.slice is not None and self.projection is not None:
+            raise ConfigError(
+                "--slice and --projection are different pictures.\nTry: one of the two options."
+            )
+
+    @property
+    def third(self) -> int:
+        """The axis across the plane of a 3-D run."""
+        return self.slice[0] if self.slice else 2 if self.projection is None else self.projection
+
+    def name_of(self, main_field: str) -> str:
+        """The name of a picture, without suffix; main_field: what it shows without `field`."""
+        what = "map"
+        if self.slice is not None:
+            what = f"slice_{'xyz'[self.slice[0]]}"
+        elif self.projection is not None:
+            what = f"projection_{'xyz'[self.projection]}"
+        return f"{what}_of_{self.field or main_field}"
+
     def plane(self, states, pixels: int) -> Plane:
-        """The pixels that all of `states` are drawn on."""
-        plane = maps.common_plane(states, pixels)
-        if self.zoom is None:
+        """The pixels that all of `states` are drawn on. Raises ConfigError."""
+        frame, state = maps.common_frame(states)
+        axes = tuple(axis for axis in (0, 1, 2) if axis != self.third)
+        part = frame[axes, :] if self.zoom is None else np.reshape(self.zoom, (2, 2))
+        plane = Plane.through_centre(part, pixels)._replace(axes=(axes[0], axes[1]))
+        if state.dimension == 2 or self.projection is not None:
             return plane
-        zoomed = Plane.through_centre(np.reshape(self.zoom, (2, 2)), pixels)
-        return zoomed._replace(height=plane.height)
+        height = self.slice[1] if self.slice else float(state.problem.centre[2])
+        low, high = frame[self.third]
+        if self.slice and not low <= height <= high:
+            raise ConfigError(
+                f"--slice {'xyz'[self.third]}={height:g}: expected a value in the domain, from "
+                f"{low:.6g} to {high:.6g}."
+            )
+        return plane._replace(height=height)
 
     def scale(self, low: float, high: float) -> Normalize:
         """The scale of colours of values from `low` to `high`. Raises ConfigError."""
@@ -66,7 +109,8 @@ class View(NamedTuple):
                 f"--log: the lowest value is {low:.3g}, but a logarithm needs values above 0.\n"
                 "Try: --range LO HI with LO above 0."
             )
-        return LogNorm(low, high)
+        # the tails of kernels at the edge of gas span any number of decades
+        return LogNorm(low if self.limits else style.lowest_of_log(low, high), high)
 
 
 def figure(states, view: View) -> Figure:

@@ -1,7 +1,5 @@
 """Whether a run has ended, runs or was interrupted, and how far it is."""
 
-import fcntl
-import os
 from pathlib import Path
 from typing import Any
 
@@ -68,6 +66,7 @@ def of(
         "time_unit": config.units.symbol(0, 0, 1),
         "step": int(rows["step"][-1]) if has_rows else (last.step if last else 0),
         "checkpoints": len(run.checkpoints()),
+        "frames": len(run.frames.paths()),
         "last_checkpoint": _shown(run, last),
         "version": summary["version"] if summary else None,
     }
@@ -94,18 +93,4 @@ def _shown(run: RunDirectory, last: Checkpoint | None) -> dict[str, Any] | None:
 
 
 def _status_without_summary(run: RunDirectory) -> str:
-    return "running" if _is_in_use(run.path / "checkpoints") else "interrupted"
-
-
-def _is_in_use(directory: Path) -> bool:
-    """Whether a process has locked `directory` (`RunDirectory.alone`); False without locks."""
-    descriptor = os.open(directory, os.O_RDONLY)
-    try:
-        fcntl.flock(descriptor, fcntl.LOCK_SH | fcntl.LOCK_NB)
-    except BlockingIOError:
-        return True
-    except OSError:
-        return False
-    finally:
-        os.close(descriptor)  # unlocks
-    return False
+    return "running" if run.is_running() else "interrupted"

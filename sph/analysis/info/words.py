@@ -47,6 +47,8 @@ def _run_state(state: dict[str, Any]) -> list[str]:
         )
     else:
         lines.append("Checkpoints: none")
+    if state["frames"]:
+        lines.append(f"Frames: {state['frames']} (`sph movie` uses them)")
     return lines
 
 

@@ -23,8 +23,8 @@ def test_profile_has_units_on_both_axes():
 def test_profile_over_the_radius_has_units_of_both_velocities():
     panels = profiles.single(state_of("gresho", *GALAXY)).axes
     speed = r"[$\mathrm{kpc}\,\mathrm{Myr}^{-1}$]"
-    assert panels[1].get_ylabel() == rf"rotation velocity $v_\phi$ {speed}"
-    assert panels[2].get_ylabel() == f"radial velocity $v_r$ {speed}"
+    assert panels[1].get_ylabel() == f"rotation velocity $v_\\phi$\n{speed}"
+    assert panels[2].get_ylabel() == f"radial velocity $v_r$\n{speed}"
     assert panels[2].get_xlabel() == f"distance from the centre $r$ {LENGTH}"
 
 
@@ -43,7 +43,9 @@ def test_history_has_units_of_its_columns(tmp_path):
     states = [state_of("kelvin_helmholtz", *GALAXY, time=t) for t in (0.0, 0.5)]
     run = write_run(tmp_path / "run", states)
     made = config.from_text(run.config.read_text())
-    panels = history.figure(read(run.history), "a run", None, made).axes
+    steps = read(run.history)
+    steps["mode_amplitude"] = np.array([1.0, 2.0])
+    panels = history.figure(steps, "a run", None, made).axes
     energy = r"[$M_\odot\,\mathrm{kpc}^{2}\,\mathrm{Myr}^{-2}$]"
     assert panels[0].get_ylabel() == f"energy $E$ {energy}"
     assert panels[1].get_ylabel() == "energy drift"
@@ -79,3 +81,31 @@ def test_labels_can_be_drawn(name):
     figure.canvas.draw()
     assert label.startswith("$P$ [$")
     assert np.count_nonzero([part in label for part in ("{-1}", "{-2}")]) == 2
+
+
+@pytest.mark.parametrize("problem", ["shock_tube", "gresho"])
+def test_labels_are_shorter_than_their_panels(tmp_path, problem):
+    state = state_of(problem, *GALAXY)
+    made = state.checkpoint.config
+    run = write_run(tmp_path / "run", [state_of(problem, *GALAXY, time=t) for t in (0.0, 0.5)])
+    steps = read(run.history)
+    steps["momentum_x"] = np.linspace(0.0, 1.0, steps["t"].size)
+    with style.paper():
+        for figure in (profiles.single(state), history.figure(steps, "a run", None, made, 1.0)):
+            figure.canvas.draw()
+            for panel in figure.axes:
+                label = panel.yaxis.get_label()
+                assert label.get_window_extent().height <= panel.bbox.height, label.get_text()
+
+
+def test_titles_have_units(tmp_path):
+    states = [state_of("point_explosion", *GALAXY, time=t) for t in (0.1, 0.2)]
+    assert maps.single(states[0]).get_suptitle().endswith("at $z$ = 0 kpc")
+    made = states[0].checkpoint.config
+    steps = read(write_run(tmp_path / "run", states).history)
+    for axis in "xyz":
+        steps[f"momentum_{axis}"][:] = 0.0
+    unit = r"$M_\odot\,\mathrm{kpc}\,\mathrm{Myr}^{-1}$"
+    title = history.figure(steps, "a run", None, made, 1e9).get_suptitle()
+    assert "conserved to round-off" in title
+    assert title.endswith(unit)

@@ -597,7 +597,7 @@ def test_views_draw_one_picture_each(shear, tube, tmp_path):
 @pytest.mark.parametrize(
     "view",
     [View("von_mises"), View(limits=(2.0, 1.0)), View(limits=(0.0, 1.0), is_log=True),
-     View(zoom=(0.0, 1.0, 1.0, 0.0))],
+     View(zoom=(0.0, 1.0, 1.0, 0.0)), View(slice=(2, 0.5)), View(projection=0)],
 )  # fmt: skip
 def test_view_that_cannot_be_drawn_is_refused(messages, shear, view):
     with messages.raised(ConfigError):
@@ -607,6 +607,62 @@ def test_view_that_cannot_be_drawn_is_refused(messages, shear, view):
 def test_map_of_line_is_refused(messages, tube):
     with messages.raised(ConfigError):
         figures.draw([tube.path], view=View("density"))
+
+
+def test_logarithmic_scale_has_four_decades_unless_given():
+    found = View(is_log=True).scale(1e-9, 2.0)
+    assert (found.vmin, found.vmax) == (2e-4, 2.0)
+    found = View(is_log=True).scale(0.1, 2.0)
+    assert (found.vmin, found.vmax) == (0.1, 2.0)
+    found = View(limits=(1e-9, 2.0), is_log=True).scale(0.1, 0.2)
+    assert (found.vmin, found.vmax) == (1e-9, 2.0)
+
+
+@pytest.fixture
+def blast(tmp_path):
+    return write_run(tmp_path / "blast", [state_of("point_explosion", time=t) for t in (0.1, 0.2)])
+
+
+def test_slice_and_projection_have_the_other_two_axes(blast):
+    state = find_source(blast.path).last()
+    for view, x, y, where, label in (
+        (View(slice=(0, 0.1)), "$y$", "$z$", "at $x$ = 0.1", r"density $\rho$"),
+        (View(slice=(1, 0.1)), "$x$", "$z$", "at $y$ = 0.1", r"density $\rho$"),
+        (View("speed", projection=2), "$x$", "$y$", "projected along $z$",
+         r"speed $|\mathbf{v}|$, mean weighted by mass"),
+        (View(projection=1), "$x$", "$z$", "projected along $y$", r"column density $\Sigma$"),
+    ):  # fmt: skip
+        picture = figure([state], view)
+        assert (picture.axes[0].get_xlabel(), picture.axes[0].get_ylabel()) == (x, y)
+        assert picture.get_suptitle().endswith(where)
+        assert picture.axes[-1].get_ylabel() == label
+    picture = figure([state], View(projection=2, zoom=(0.0, 0.2, 0.1, 0.2)))
+    assert picture.axes[0].images[0].get_extent() == [0.0, 0.2, 0.1, 0.2]
+
+
+def test_slices_show_other_values_at_other_places(blast):
+    state = find_source(blast.path).last()
+    state.particles.internal_energy[:] = 1.0 + state.particles.position[0]
+    state.particles.density[:] = 1.0
+    state.particles.support[:] = 0.25
+    for x in (-0.2, 0.3):
+        image = figure([state], View("internal_energy", slice=(0, x))).axes[0].images[0]
+        # 8 particles a side: off the lattice by half a spacing of 1/8 at most
+        np.testing.assert_allclose(np.ma.getdata(image.get_array()), 1.0 + x, atol=0.06)
+
+
+def test_pictures_of_slices_have_names_of_their_own(blast):
+    names = [
+        figures.draw([blast.path], view=view)[0].name
+        for view in (View(), View(slice=(0, 0.1)), View("speed", projection=1))
+    ]
+    assert names == ["map_of_density.png", "slice_x_of_density.png", "projection_y_of_speed.png"]
+
+
+def test_slice_outside_or_with_projection_is_refused(messages, blast):
+    for view in (View(slice=(0, 7.0)), View(slice=(0, 0.0), projection=0)):
+        with messages.raised(ConfigError):
+            figures.draw([blast.path], view=view)
 
 
 # --- history ----------------------------------------------------------------------------------
@@ -650,6 +706,21 @@ def test_history_figure_leaves_out_zeros_and_round_off_of_momentum(shear):
     assert "round-off" not in picture.get_suptitle()
 
 
+def test_history_figure_names_constants_in_place_of_flat_panels(shear):
+    found = read_history(shear.history)
+    found["mode_amplitude"] = np.array([1.0, 2.0])
+    found["volume_ratio"] = np.array([0.9975, 0.9975 * (1.0 + 1e-15)])
+    found["held_supports"] = np.array([0.0, 0.0])
+    picture = history.figure(found, "a run")
+    labels = [panel.get_ylabel() for panel in picture.axes]
+    assert not any("volume" in label or "held" in label for label in labels)
+    assert (
+        picture.get_suptitle() == "a run\n" + r"$\sum m/\rho$ over the volume is 0.998 throughout"
+    )
+    found["held_supports"] = np.array([0.0, 1.0])
+    assert "held supports" in [panel.get_ylabel() for panel in history.figure(found, "a").axes]
+
+
 def test_history_legends_cover_no_data(shear):
     picture = history.figure(read_history(shear.history), "a run")
     picture.draw_without_rendering()
@@ -661,6 +732,7 @@ def test_history_legends_cover_no_data(shear):
 def test_history_figure_shows_gravitational_energy_and_theory_of_energies(shear):
     found = read_history(shear.history)
     found["gravitational_energy"] = np.array([-2.0, -3.0])
+    found["mode_amplitude"] = np.array([1.0, 2.0])
     beside = {name: np.array([1.0, 2.0]) for name in ("kinetic_energy", "gravitational_energy")}
     panels = history.figure(found, "a run", beside).axes
     assert len(panels) == 5  # no panel of its own, unlike the mode's amplitude

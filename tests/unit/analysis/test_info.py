@@ -183,6 +183,14 @@ def test_run_in_another_process_is_running(tube):
         pass
 
 
+def test_frames_are_counted(tube):
+    assert "Frames" not in in_words(info.of(tube.path))
+    with tube.frames.held():
+        for step in (0, 7):
+            tube.frames.path_of(step).touch()
+    assert "Frames: 2 (`sph movie` uses them)" in in_words(info.of(tube.path))
+
+
 def test_run_without_checkpoints_is_described_by_its_configuration(tube):
     for path in tube.checkpoints():
         path.unlink()

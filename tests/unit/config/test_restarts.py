@@ -37,8 +37,8 @@ strength = {{ name = "elastic", shear_modulus = 1.0 }}
 """
 
 # a changed value of every key beside [problem], by what a restart does with it
-FREE = ["time.end=0.3", "output.interval=0.1", "report.reference=fine", "run.threads=2",
-        "physics.max_energy_drift=0.1"]  # fmt: skip
+FREE = ["time.end=0.3", "output.interval=0.1", "output.frames=5", "report.reference=fine",
+        "run.threads=2", "physics.max_energy_drift=0.1"]  # fmt: skip
 RECORDED = ["physics.scheme=variational", "physics.kernel=cubic_spline", "physics.density=number",
             "physics.alpha=2.0", "physics.conductivity=approach", "physics.eta=1.5",
             "physics.allow_pairing=true", "physics.max_support=2.0", "physics.C=0.1",

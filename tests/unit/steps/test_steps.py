@@ -163,10 +163,10 @@ def broken_at(simulation, step, field, value):
     """Set an entry of a field at a step."""
     proceed = simulation.proceed
 
-    def broken(until, most):
+    def broken(until, most, pause=np.inf):
         if simulation.step == step:
             getattr(simulation.particles, field)[..., 7] = value
-        proceed(until, min(most, 1))
+        proceed(until, min(most, 1), pause)
 
     simulation.proceed = broken
 
