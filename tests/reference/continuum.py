@@ -377,8 +377,8 @@ def rates(scene: Scene, matter: Matter, factor: np.ndarray | None = None) -> Rat
 
 
 def time_step(scene: Scene, matter: Matter, now: Rates) -> float:
-    """0.3 d/(Q + sqrt(Q^2 + c^2)), the smallest of all particles."""
-    return (0.6 * scene.lengths(matter.mass, matter.density) / now.signal_speed).min()
+    """0.6 d/(Q + sqrt(Q^2 + c^2)), the smallest of all particles: C = 0.3."""
+    return (1.2 * scene.lengths(matter.mass, matter.density) / now.signal_speed).min()
 
 
 # --- the step ---

@@ -277,7 +277,7 @@ def test_two_particles_match_by_hand(order):
     np.testing.assert_allclose(found.energy_rate, work / m, rtol=1e-13)
     Q = c - 2.0 * mu_0
     np.testing.assert_allclose(found.signal_speed, 2 * (Q + np.sqrt(Q**2 + c**2)), rtol=1e-14)
-    step = 0.3 * d / (Q + np.sqrt(Q**2 + c**2))
+    step = 0.6 * d / (Q + np.sqrt(Q**2 + c**2))
     assert continuum.time_step(scene, matter, found) == pytest.approx(step.min(), rel=1e-14)
 
 

@@ -175,11 +175,11 @@ def into_box(case, body):
 
 
 def first_step(case, body, end):
-    """Eq 32 with C = 0.15, and C (H/|a|)^(1/2)."""
+    """Eq 32 with C = 0.3, and C (H/|a|)^(1/2)."""
     lengths = case.dense_scene.lengths(body.mass, body.density)
-    signal = (0.6 * lengths / body.rates.signal_speed).min()
+    signal = (1.2 * lengths / body.rates.signal_speed).min()
     force = continuum.norm(body.rates.acceleration)
-    return min(signal, 0.15 * np.sqrt(2 * lengths / force).min(), end)
+    return min(signal, 0.3 * np.sqrt(2 * lengths / force).min(), end)
 
 
 CONSERVING = [
