@@ -45,7 +45,7 @@ from sph.simd import (
     zeros,
 )
 
-# Ratio of volumes half a step ago and now below which eq 406 is not used.
+# Ratio of volumes half a step ago and now below which eq 416 is not used.
 LEAST_VOLUME = 0.1
 
 # Condition number of M above which order 1 falls back to order 0; relative to the identity, M is
@@ -58,10 +58,11 @@ def gradients(
     first, last, dim, models, neighbours, position, velocity, mass, density, support, before,
     kernel_factor, kernel_gradient, kernel_matrix, velocity_gradient, div_v, density_rate, dt,
 ):  # fmt: skip
-    """Gradient pass over superblocks [first, last): eqs 402-407.
+    """Gradient pass over superblocks [first, last): eqs 402-407 and 416.
 
-    Reads the predicted velocity (D, N) and density (N,). Writes velocity_gradient (D, D, N), div_v
-    (N,), density_rate (N,) and the correction of the kernel, of which the arrays are None that its
+    Reads the velocity (D, N) in the middle of the step of length dt, the predicted density (N,) and
+    the density (N,) `before` the step. Writes velocity_gradient (D, D, N), div_v (N,) and
+    density_rate (N,) in the middle of the step, and the correction of the kernel, of which the arrays are None that its
     order does not need: order 0 has kernel_factor (N,) and kernel_gradient (D, N), order 1 has
     kernel_matrix (D, D, N) and kernel_gradient, which is not zero where it falls back to order 0.
     """
@@ -206,7 +207,7 @@ def _corrected(M, alpha, mixed, grad_alpha, L):
 
 @njit(**INLINED)
 def _centred(L, B, M, half):
-    """Set M to L (I - half L)^-1, eq 406; B is overwritten.
+    """Set M to L (I - half L)^-1, eq 416; B is overwritten.
 
     M is L where half a step backwards would turn the matter inside out, or nearly so.
     """
