@@ -26,7 +26,6 @@ sources. `sph list` prints the first column.
 """
 PICTURES = {
     "shock_tube": ("sod.png", "Sod's shock tube and the exact solution"),
-    "kelvin_helmholtz": ("kh_growth.png", "Growth of the instability"),
     "kelvin_helmholtz_smooth": ("shear_layer.png", "Billows of a shear layer"),
     "point_explosion": ("blast.png", "Dense shell of a blast wave"),
 }
@@ -70,8 +69,11 @@ def _about(name: str) -> tuple[str, str]:
 
 
 def _picture(name: str) -> str:
-    file, shown = PICTURES.get(name, ("", ""))
-    return f"![{shown}](../images/{file})" if file else ""
+    """Return a picture: one with a caption of its own, or one of scripts/problem_pictures.py."""
+    own = (f"problems/{name}.png", f"The run of configs/{name}.toml")
+    file, shown = PICTURES.get(name, own)
+    exists = (ROOT / "docs" / "images" / file).exists()
+    return f"![{shown}](../images/{file})" if exists else ""
 
 
 def _commands(name: str) -> str:

@@ -58,6 +58,7 @@ def describe(config: Config) -> str:
     whose = f" of particle {sample.limit.particle}" if is_whole else ""
     lines = [
         "The configuration is valid.",
+        *config.problem.remarks(),
         "Compiled in:",
         *(f"  {part}" for part in inside),
         "Left out:",

@@ -19,6 +19,10 @@ RATE = "time^-1"
 SECONDS = "s"
 CPU_SECONDS = "CPU s"
 
+# Least and largest unit of length, mass and time in cm, g and s: products of powers of units are
+# then finite numbers.
+UNIT_RANGE = (1e-40, 1e40)
+
 
 class Quantity(NamedTuple):
     """A number of the output.
@@ -35,13 +39,14 @@ class Quantity(NamedTuple):
 # Fields of particles in figures and profiles.
 FIELDS = {
     "x": Quantity("position along x", LENGTH),
-    "r": Quantity("distance from the centre of the problem", LENGTH),
+    "r": Quantity("distance from the centre of the problem, which moves with the flow", LENGTH),
     "density": Quantity("density", DENSITY),
     "column_density": Quantity("mass per area along a line of sight", "mass length^-2"),
     "velocity": Quantity("velocity along the coordinate of the profile", VELOCITY),
-    "velocity_phi": Quantity("velocity across the radius", VELOCITY),
-    "v_r": Quantity("velocity along the radius", VELOCITY),
-    "v_phi": Quantity("velocity across the radius, anticlockwise", VELOCITY),
+    "v_r": Quantity("velocity along the radius, relative to the centre", VELOCITY),
+    "v_phi": Quantity(
+        "velocity across the radius, anticlockwise, relative to the centre", VELOCITY
+    ),
     "speed": Quantity("size of the velocity", VELOCITY),
     "pressure": Quantity("pressure", PRESSURE),
     "internal_energy": Quantity("internal energy per unit mass", SPECIFIC_ENERGY),

@@ -36,6 +36,8 @@ def run(config: Config, directory: RunDirectory, progress) -> dict:
     """
     with session(directory, config, progress) as (stopped_by, clock):
         progress.note("preparing the initial state")
+        for remark in config.problem.remarks():
+            progress.note(remark)
         simulation = Simulation.of_problem(Scene(config), threads_of(config), clock)
         directory.write_config(config.to_toml())
         if source := getattr(config.problem, "source", b""):

@@ -1,9 +1,11 @@
-"""Hooks of MkDocs: pages of the site from documents outside docs/."""
+"""Hooks of MkDocs: pages of the site from documents outside docs/, and MathJax."""
 
 import os
 import re
+from importlib.metadata import distribution
 from pathlib import Path
 
+from mkdocs.exceptions import PluginError
 from mkdocs.structure.files import File
 
 ROOT = Path(__file__).parents[2]
@@ -12,6 +14,8 @@ PAGES = {
     "CONTRIBUTING.md": "contributing.md",
     "CHANGELOG.md": "changelog.md",
 }
+# One script with all glyphs and extensions, from a package that only holds MathJax.
+MATHJAX = ("django-static-mathjax", "mathjax/static/mathjax/es5/tex-svg-full.js")
 
 
 def relinked(text: str, folder: str, page: str) -> str:
@@ -38,10 +42,13 @@ def relinked(text: str, folder: str, page: str) -> str:
 
 
 def on_files(files, config):
-    """Add the documents of the repository's top directory."""
+    """Add the documents of the repository's top directory, and MathJax."""
     for name, page in PAGES.items():
         text = (ROOT / name).read_text(encoding="utf-8")
         files.append(File.generated(config, page, content=relinked(text, "", page)))
+    package, path = MATHJAX
+    script = str(distribution(package).locate_file(path))
+    files.append(File.generated(config, "site/tex-svg.js", abs_src_path=script))
     return files
 
 
@@ -51,3 +58,11 @@ def on_page_markdown(markdown, page, config, files):
     if source in PAGES.values():
         return markdown
     return relinked(markdown, os.path.dirname(f"docs/{source}"), source)
+
+
+def on_post_page(output, page, config):
+    """Refuse pages that load anything from another server: the site works without network."""
+    tag = r"<(?:script|link|img|iframe)\b[^>]*(?:src|href)=\"?(?:https?:)?//[^>]*>"
+    if loaded := re.search(tag, output):
+        raise PluginError(f"{page.file.src_uri} loads {loaded.group()}")
+    return output

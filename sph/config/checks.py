@@ -68,6 +68,14 @@ def under_physics(found: dict[str, Section]) -> list[Issue]:
     return []
 
 
+def under_units(found: dict[str, Section]) -> None:
+    """Let the problem take what it needs from [units]. Raises FileError for a wrong file."""
+    if {"problem", "units"} <= found.keys():
+        units = found["units"]
+        given = units.in_cgs() if units.are_given else None
+        found["problem"] = found["problem"].in_units(given)
+
+
 def steps_issues(found: dict[str, Section]) -> list[Issue]:
     """Return an issue if the formulation has no individual time steps, which the user wants."""
     if not {"time", "physics"} <= found.keys() or found["time"].stepping == "global":

@@ -19,6 +19,7 @@ from sph.config.errors import (
     suggestion,
 )
 from sph.config.toml_text import Path, key_lines, value_text
+from sph.config.units import Units
 from sph.errors import ConfigError, FileError
 from sph.problems.base import Problem, Section
 
@@ -183,7 +184,7 @@ def resolve(
         _fill_defaults(raw, problem, models)
         _fill_tables(raw["problem"], source, problem)
         _make_paths_absolute(raw["problem"], source, problem)
-        raw["problem"], faults = problem.filled(raw["problem"])
+        raw["problem"], faults = problem.filled(raw["problem"], _in_cgs(raw["units"]))
         issues += [Issue(("problem", *fault.path), fault.text) for fault in faults]
         issues += checks.shape_issues(raw["problem"], problem)
     issues += not_finite(raw)
@@ -208,6 +209,7 @@ def resolve(
     issues += checks.gas_issues(found)
     issues += checks.part_issues(found)
     issues += checks.under_physics(found)
+    checks.under_units(found)
     issues += checks.steps_issues(found)
     if not recorded:
         issues += checks.pairing_issues(found)
@@ -215,6 +217,15 @@ def resolve(
     if issues:
         raise ConfigError("\n".join(_reports(source, issues)))
     return found
+
+
+def _in_cgs(raw: dict[str, Any]) -> tuple[float, float, float] | None:
+    """Return [units] in cm, g and s; None if not given, or wrong, which is reported elsewhere."""
+    try:
+        units = Units.model_validate(raw)
+    except ValidationError:
+        return None
+    return units.in_cgs() if units.are_given else None
 
 
 def _without(table: dict[str, Any], keys: set[Any]) -> dict[str, Any]:

@@ -1,10 +1,11 @@
-"""The table [units]: which physical units the numbers of a run are in. It changes no number."""
+"""The table [units]: which physical units the numbers of a run are in."""
 
 from typing import TYPE_CHECKING, Annotated, ClassVar, Literal, Self
 
 from pydantic import Field, model_validator
 
 from sph.problems.base import Section
+from sph.quantity import UNIT_RANGE
 
 # Values in cgs. Solar and terrestrial masses are the nominal GM of IAU 2015 resolution B3 over
 # G = 6.67430e-8 (CODATA 2018), radii are nominal too; au, ly, pc and yr (Julian) are exact.
@@ -24,8 +25,7 @@ TIMES = {
 CGS = {"length": "cm", "mass": "g", "time": "s"}
 
 
-# so that products of powers are finite numbers
-Positive = Annotated[float, Field(ge=1e-40, le=1e40)]
+Positive = Annotated[float, Field(ge=UNIT_RANGE[0], le=UNIT_RANGE[1])]
 if TYPE_CHECKING:
     Length = str
     Mass = str
@@ -39,8 +39,9 @@ else:
 class Units(Section):
     """Physical units of the numbers in this file and in the output: all three keys, or none.
 
-    They are labels and conversion factors in checkpoints, exports, figures and reports. The
-    program computes with the bare numbers. Constants such as G must be in these units.
+    They are labels and conversion factors in checkpoints, exports, figures and reports, and an
+    initial state from a file that states other units is converted to them. The program computes
+    with the bare numbers. Constants such as G must be in these units.
     """
 
     restart: ClassVar[str | None] = "free"

@@ -12,6 +12,8 @@ from pydantic_core import PydanticCustomError
 from sph.quantity import Quantity
 
 Boundary = Literal["periodic", "mirror", "open"]
+# Units of length, mass and time in cm, g and s.
+Units = tuple[float, float, float]
 
 
 class Relaxation(NamedTuple):
@@ -133,11 +135,13 @@ class Problem(Section):
     )
 
     @classmethod
-    def filled(cls, keys: dict[str, Any]) -> tuple[dict[str, Any], list[Fault]]:
+    def filled(
+        cls, keys: dict[str, Any], units: Units | None = None
+    ) -> tuple[dict[str, Any], list[Fault]]:
         """Return the keys with those that the problem finds elsewhere, and faults of given keys.
 
-        keys: the table [problem] before validation. Raises FileError for a file that is missing or
-        wrong.
+        keys: the table [problem] before validation; units: as of `in_units`. Raises FileError for a
+        file that is missing or wrong.
         """
         return keys, []
 
@@ -172,6 +176,18 @@ class Problem(Section):
         [problem] do not match them.
         """
         return self
+
+    def in_units(self, units: Units | None):
+        """Return the problem with what it takes from [units].
+
+        units: of length, mass and time in cm, g and s, or None without [units]. The configuration
+        calls this once.
+        """
+        return self
+
+    def remarks(self) -> list[str]:
+        """Return what a run says about the problem at its start, one text each."""
+        return []
 
     @property
     def clamps(self) -> bool:

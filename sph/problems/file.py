@@ -3,12 +3,14 @@
 import os
 from typing import Annotated, Any, ClassVar, Literal
 
-from pydantic import Field, model_validator
+from pydantic import Field, PrivateAttr, field_validator, model_validator
 
 from sph.errors import ConfigError
 from sph.problems import base, files
 from sph.problems.base import Fault
 from sph.problems.files import contents
+from sph.problems.files.units import Conversion
+from sph.quantity import UNIT_RANGE
 
 _SHARED = base.Problem.model_fields
 
@@ -30,7 +32,7 @@ class Problem(base.Problem):
     }
     profiled: ClassVar = False
     paths: ClassVar = ("path",)
-    filled_in: ClassVar = ("path", *FILLED_IN)
+    filled_in: ClassVar = ("path", *FILLED_IN, "file_units")
 
     name: Literal["file"] = "file"
     path: str = Field(
@@ -46,6 +48,13 @@ class Problem(base.Problem):
         description="SHA-256 of the file in hexadecimal digits; checked if given, that of the file "
         "otherwise, so that a run and its checkpoints tell from which file the run began",
         examples=["0" * 64],
+    )
+    file_units: list[Annotated[float, Field(ge=UNIT_RANGE[0], le=UNIT_RANGE[1])]] | None = Field(
+        default=None,
+        description="units of length, mass and time of the numbers in the file, in cm, g and s: "
+        "those that the file states if not given, [] if it states none; with [units], numbers are "
+        "converted to these, otherwise they are taken as they are",
+        examples=[[3.0857e21, 1.9884e43, 3.0857e16]],
     )
     dimension: Annotated[int, _SHARED["dimension"]] = Field(
         default=2,
@@ -74,6 +83,8 @@ class Problem(base.Problem):
         examples=["periodic"],
     )
 
+    _conversion: Conversion = PrivateAttr(default=Conversion())
+
     @model_validator(mode="before")
     @classmethod
     def _fill_in(cls, keys: Any) -> Any:
@@ -85,7 +96,9 @@ class Problem(base.Problem):
         return keys
 
     @classmethod
-    def filled(cls, keys: dict[str, Any]) -> tuple[dict[str, Any], list[Fault]]:
+    def filled(
+        cls, keys: dict[str, Any], units: base.Units | None = None
+    ) -> tuple[dict[str, Any], list[Fault]]:
         """Return the keys with those that the file states, and faults of keys that contradict it.
 
         Raises FileError if the file cannot be used. Does not read the file if all keys are given.
@@ -98,7 +111,7 @@ class Problem(base.Problem):
             return keys, [Fault(("path",), f"= {path!a}: expected printable UTF-8 text")]
         if all(keys.get(name) for name in FILLED_IN):
             return keys, []
-        found = files.read(path, dimension)
+        found = files.read(path, dimension, Conversion(_given(keys.get("file_units")), units))
         dimension = len(found.position)
         box = contents.extent(found.position) if found.box is None else found.box
         stated = {
@@ -107,16 +120,48 @@ class Problem(base.Problem):
             "n": found.mass.size,
             "domain": box.tolist(),
             "boundary": found.boundary,
+            "file_units": list(found.units or ()),
         }
         given = {name: value for name, value in keys.items() if value not in ("", None)}
+        if given.get("file_units") == []:
+            del given["file_units"]
         return stated | given | {"path": path}, _contradictions(given, stated)
 
-    @model_validator(mode="after")
-    def _has_particles_inside(self):
-        kept = files.kept(self.path, self.sha256, self.dimension)
+    @field_validator("file_units")
+    @classmethod
+    def _three_or_none(cls, given: list[float] | None) -> list[float] | None:
+        if given is not None and len(given) not in (0, 3):
+            raise ValueError("expected three numbers, the units of length, mass and time")
+        return given
+
+    def in_units(self, units: base.Units | None) -> "Problem":
+        """Return the problem with the units of the run.
+
+        Raises FileError if a particle is outside the box, where the file has just been read.
+        """
+        found = self.model_copy()
+        found._conversion = Conversion(_given(self.file_units), units)
+        kept = files.kept(self.path, self.sha256, self.dimension, found._conversion)
         if kept is not None and self.box.shape == (len(self.boundaries), 2):
             contents.check_inside(kept, self.box, self.boundaries)
-        return self
+        return found
+
+    def remarks(self) -> list[str]:
+        """Return what becomes of the units of the file; nothing if none are stated anywhere."""
+        of_file, of_run = self._conversion
+        if of_file is None:
+            text = "states no units: its numbers are taken as they are, in the units of [units]."
+            return [f"{self.path} {text}"] if of_run and self.file_units is not None else []
+        words = "length {:.6g} cm, mass {:.6g} g, time {:.6g} s".format(*of_file)
+        if of_run is not None:
+            if of_file == of_run:
+                return [f"{self.path} is in the units of [units]."]
+            return [f"{self.path}: numbers are converted from its units ({words}) to [units]."]
+        return [
+            f"{self.path} states units: {words}. Its numbers are taken as they are, and the output "
+            "states no units, because the configuration has no [units].\nTry, to keep these units: "
+            "[units] with length = {!r}, mass = {!r}, time = {!r}".format(*of_file)
+        ]
 
     def fills_box(self, eos) -> bool:
         """Return False: positions are arbitrary."""
@@ -124,7 +169,7 @@ class Problem(base.Problem):
 
     def initial(self, eos) -> base.InitialState:
         """Return the particles of the file, in the order of their IDs if the file has some."""
-        found = files.take(self.path, self.sha256, self.dimension)
+        found = files.take(self.path, self.sha256, self.dimension, self._conversion)
         stated = {"sha256": found.sha256, "n": found.mass.size}
         if faults := _contradictions(self.model_dump(), stated):
             raise ConfigError("\n".join(f"problem.{one.path[0]} {one.text}" for one in faults))
@@ -147,3 +192,11 @@ def _contradictions(given: dict[str, Any], stated: dict[str, Any]) -> list[Fault
         text = f"= {given['n']}: expected {stated['n']}, the number of particles in the file"
         found.append(Fault(("n",), f"{text}. Try: leave n out"))
     return found
+
+
+def _given(units: Any) -> base.Units | None:
+    """Return the key `file_units` as a tuple; None if not given, or wrong, as types tell later."""
+    if not isinstance(units, list) or len(units) != 3:
+        return None
+    numbers = all(isinstance(one, int | float) and one > 0.0 for one in units)
+    return (float(units[0]), float(units[1]), float(units[2])) if numbers else None

@@ -12,8 +12,9 @@ from pydantic import Field
 from sph import quantity as units
 from sph.problems import _relax, base
 from sph.problems.base import wide
+from sph.problems.support import centred
 from sph.problems.support import lattice as placement
-from sph.problems.support.vortex import from_centre, rotation
+from sph.problems.support.vortex import rotation
 from sph.quantity import Quantity
 
 _SHARED = base.Problem.model_fields
@@ -95,7 +96,8 @@ class Problem(_relax.Relaxable):
 
     def exact(self, eos, time: float, position: np.ndarray) -> dict[str, np.ndarray]:
         """Return the initial vortex, moved with the uniform velocity, at (D, N) positions."""
-        offset, radius = from_centre(self.box, position, self.velocity, time)
+        offset = centred.offset(self, time, position)
+        radius = centred.radius(offset)
         speed, pressure = profile(radius)
         pressure += self._central_pressure(eos)
         density = np.full(radius.size, DENSITY)
@@ -113,10 +115,9 @@ class Problem(_relax.Relaxable):
         error_v_phi: mean |v_phi - exact|; peak_v_phi: largest mean v_phi of rings one spacing wide;
         peak_v_phi_exact: this value computed from exact velocities at the particles.
         """
-        offset, radius = from_centre(self.box, particles.position, self.velocity, time)
-        moving = particles.velocity - np.array(self.velocity)[:, None]
-        across = rotation(offset, 1.0 / np.where(radius > 0.0, radius, 1.0))
-        v_phi = (moving * across).sum(axis=0)
+        offset = centred.offset(self, time, particles.position)
+        radius = centred.radius(offset)
+        v_phi = centred.components(self, offset, particles.velocity)["v_phi"]
         exact, _ = profile(radius)
         volume = particles.mass / particles.density
         ring = (radius / placement.spacing(self.box, radius.size)).astype(int)

@@ -11,8 +11,9 @@ from pydantic import Field
 
 from sph.problems import base
 from sph.problems.base import wide
+from sph.problems.support import centred
 from sph.problems.support import lattice as placement
-from sph.problems.support.vortex import from_centre, rotation
+from sph.problems.support.vortex import rotation
 
 _SHARED = base.Problem.model_fields
 
@@ -78,7 +79,8 @@ class Problem(base.Problem):
 
     def exact(self, eos, time: float, position: np.ndarray) -> dict[str, np.ndarray]:
         """Return the initial vortex, moved with the uniform velocity, at (D, N) positions."""
-        offset, radius = from_centre(self.box, position, self.velocity, time)
+        offset = centred.offset(self, time, position)
+        radius = centred.radius(offset)
         # rotation rate, and P/rho, which is 1 far away; P = rho^gamma
         rate = STRENGTH / (2.0 * np.pi) * np.exp(0.5 * (1.0 - radius**2))
         temperature = 1.0 - 0.5 * (eos.gamma - 1.0) / eos.gamma * rate**2

@@ -12,7 +12,7 @@ from sph.analysis import truth
 from sph.analysis.export import fields
 from sph.output.checkpoint import Checkpoint
 from sph.output.files import replacing
-from sph.problems.support import uniaxial
+from sph.problems.support import centred, uniaxial
 from sph.quantity import FIELDS
 from sph.state import Public
 
@@ -95,9 +95,9 @@ def write_times(times: Mapping[str, float], directory: Path) -> Path:
 def profile(checkpoint: Checkpoint) -> dict[str, np.ndarray]:
     """Return columns (M,) of the particles where errors are taken, by ascending coordinate.
 
-    The coordinate is x, or the distance r from the centre of problems that are round; velocity is
-    the component along it, velocity_phi the one across it in 2-D. NAME_exact is the exact solution
-    at the particle, where it holds.
+    The coordinate is x, or the distance r from the centre of problems that are round. Beside x,
+    velocity is the component along x; beside r, v_r and in 2-D v_phi are those about the centre,
+    which moves with the flow. NAME_exact is the exact solution at the particle, where it holds.
     """
     state, problem = checkpoint.particles, checkpoint.config.problem
     eos, time = checkpoint.config.physics.eos_model(), checkpoint.time
@@ -105,38 +105,32 @@ def profile(checkpoint: Checkpoint) -> dict[str, np.ndarray]:
     if not inside.any():
         inside = np.ones(state.number, dtype=bool)
     position = state.position[:, inside]
+    along = _Axis(problem, time, position)
     found = {name: _scalar(checkpoint, name)[inside] for name in _scalars(problem)}
-    along = _Axis(problem, position)
-    found |= along.components("velocity", state.velocity[:, inside])
+    found |= along.components(state.velocity[:, inside])
     columns = {along.name: along.coordinate, **found}
     if truth.left_out(checkpoint.config, time, state.position) is None:
         exact = problem.exact(eos, time, position) or {}
-        velocity = exact.get("velocity")
-        if velocity is not None:
-            exact = {**exact, **along.components("velocity", velocity)}
+        if "velocity" in exact:
+            exact = exact | along.components(exact["velocity"])
         columns |= {f"{name}_exact": exact[name] for name in found if name in exact}
     order = np.argsort(along.coordinate, kind="stable")
     return {name: values[order] for name, values in columns.items()}
 
 
 class _Axis:
-    """The coordinate of a profile, and the components of vectors along and across it."""
+    """The coordinate of a profile, and the components of velocities along and across it."""
 
-    def __init__(self, problem, position: np.ndarray):
-        self.is_round = problem.radial and len(position) > 1
-        self.name = "r" if self.is_round else "x"
-        offset = position - problem.centre[:, None]
-        length = np.sqrt((offset**2).sum(axis=0))
-        self.coordinate = length if self.is_round else position[0]
-        self._unit = offset / np.where(length > 0.0, length, 1.0)
+    def __init__(self, problem, time: float, position: np.ndarray):
+        self._problem, self._offset = problem, centred.offset(problem, time, position)
+        self._is_round = problem.radial and len(position) > 1
+        self.name = "r" if self._is_round else "x"
+        self.coordinate = centred.radius(self._offset) if self._is_round else position[0]
 
-    def components(self, name: str, vector: np.ndarray) -> dict[str, np.ndarray]:
-        if not self.is_round:
-            return {name: vector[0]}
-        found = {name: (vector * self._unit).sum(axis=0)}
-        if len(vector) == 2:
-            found[f"{name}_phi"] = self._unit[0] * vector[1] - self._unit[1] * vector[0]
-        return found
+    def components(self, velocity: np.ndarray) -> dict[str, np.ndarray]:
+        if not self._is_round:
+            return {"velocity": velocity[0]}
+        return centred.components(self._problem, self._offset, velocity)
 
 
 def _scalars(problem) -> list[str]:

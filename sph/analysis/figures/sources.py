@@ -14,7 +14,7 @@ from sph.domain import Domain
 from sph.errors import FileError
 from sph.output import checkpoint, frames, same_run
 from sph.output.run_directory import RunDirectory, find
-from sph.problems.support import uniaxial
+from sph.problems.support import centred, uniaxial
 from sph.quantity import FIELDS
 
 
@@ -236,7 +236,7 @@ class State:
         v_r and v_phi about the problem's centre, von_mises, or stress, -sigma_xx of a solid.
         """
         if name in ("v_r", "v_phi"):
-            return self._about_centre(name)
+            return centred.components(self.problem, self.offset, self.particles.velocity)[name]
         if name == "speed":
             return np.linalg.norm(self.particles.velocity, axis=0)
         if name == "von_mises":
@@ -271,29 +271,12 @@ class State:
     @cached_property
     def offset(self) -> np.ndarray:
         """(D, N) offset of particles from the centre of the solution, which moves with `drift`."""
-        problem = self.problem
-        centre = problem.centre + problem.drift * self.time
-        offset = self.particles.position - centre[:, None]
-        for axis, boundary in enumerate(problem.boundaries):
-            if boundary == "periodic":
-                length = problem.box[axis, 1] - problem.box[axis, 0]
-                offset[axis] -= length * np.round(offset[axis] / length)
-        return offset
+        return centred.offset(self.problem, self.time, self.particles.position)
 
     @cached_property
     def radius(self) -> np.ndarray:
         """(N,) distance of particles from the centre of the solution."""
-        return np.linalg.norm(self.offset, axis=0)
-
-    def _about_centre(self, name: str) -> np.ndarray:
-        """(N,) component of the velocity along the offset, or in 2-D anticlockwise across it."""
-        velocity = self.particles.velocity - self.problem.drift[:, None]
-        offset = self.offset
-        if name == "v_r":
-            along = (velocity * offset).sum(axis=0)
-        else:
-            along = offset[0] * velocity[1] - offset[1] * velocity[0]
-        return along / np.where(self.radius > 0.0, self.radius, 1.0)
+        return centred.radius(self.offset)
 
     @property
     def is_radial(self) -> bool:

@@ -61,7 +61,7 @@ def _figures(rows: Sequence[Row], prefix: str) -> str:
     lines = [
         (name.removeprefix(prefix), *(number(_value(row, name)) for row in ended)) for name in names
     ]
-    header = ("name", *(_name(row) for row in ended))
+    header = ("name", *(_name(row).replace(",", ", ") for row in ended))  # where lines may break
     return table(header, lines, ("name", *["number"] * len(ended)))
 
 

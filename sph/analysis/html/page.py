@@ -11,32 +11,51 @@ from sph.output.files import opened
 from sph.version import __version__
 
 STYLE = """
-:root { color-scheme: light; --line: #d5d9e0; --soft: #f4f6f9; --ink: #1c2430; --accent: #0072b2; }
-body { font: 16px/1.5 system-ui, sans-serif; color: var(--ink); max-width: 72rem;
-  margin: 0 auto; padding: 1.5rem; }
-h1 { font-size: 1.7rem; margin: 0 0 .3rem; }
+:root { color-scheme: light dark; --paper: #fff; --line: #d5d9e0; --soft: #f4f6f9; --ink: #1c2430;
+  --muted: #556; --accent: #0072b2; --note: #fdf3ec; }
+@media (prefers-color-scheme: dark) {
+  :root { --paper: #14181f; --line: #3a424e; --soft: #1f252e; --ink: #e4e8ee; --muted: #a9b2bf;
+    --accent: #6cb4e8; --note: #38281b; }
+}
+body { font: 16px/1.5 system-ui, sans-serif; color: var(--ink); background: var(--paper);
+  max-width: 72rem; margin: 0 auto; padding: 1.5rem; }
+h1 { font-size: 1.7rem; margin: 0 0 .3rem; overflow-wrap: anywhere; }
 h2 { font-size: 1.2rem; margin: 2.2rem 0 .6rem; border-bottom: 1px solid var(--line); }
 nav a { margin-right: 1rem; white-space: nowrap; }
 a { color: var(--accent); }
+table + table { margin-top: 1rem; }
+sup { line-height: 0; }
+p, li { overflow-wrap: anywhere; }
 table { border-collapse: collapse; display: block; overflow-x: auto; }
 th, td { text-align: left; padding: .25rem .8rem .25rem 0; vertical-align: top;
   border-bottom: 1px solid var(--line); }
-td.number, th.number { text-align: right; font-variant-numeric: tabular-nums; white-space: nowrap; }
+td.number, th.number { text-align: right; font-variant-numeric: tabular-nums; }
 td.name { font-family: ui-monospace, monospace; font-size: .9em; }
-td.name, td.unit { white-space: nowrap; }
+td.name, td.number, td.unit { white-space: nowrap; }
 td.value { font-family: ui-monospace, monospace; font-size: .9em; overflow-wrap: anywhere; }
 pre { background: var(--soft); padding: .8rem; overflow-x: auto; font-size: .85rem; }
 figure { margin: 1rem 0; } img { max-width: 100%; height: auto; }
-figcaption { color: #556; font-size: .9rem; }
+figcaption { color: var(--muted); font-size: .9rem; }
 .status { display: inline-block; padding: 0 .6rem; border-radius: .8rem; color: white;
   background: #555; }
 .done { background: #00735a; } .failed { background: #b02a00; }
-.stopped, .interrupted { background: #8a6100; } .running { background: var(--accent); }
-.warning { border-left: .3rem solid #d55e00; background: #fdf3ec; padding: .5rem .8rem;
+.stopped, .interrupted { background: #8a6100; } .running { background: #0072b2; }
+.warning { border-left: .3rem solid #d55e00; background: var(--note); padding: .5rem .8rem;
   margin: .5rem 0; }
 .bar { background: var(--accent); height: .8rem; min-width: 1px; }
 .share { width: 16rem; min-width: 6rem; }
-footer { margin-top: 3rem; color: #556; font-size: .85rem; }
+footer { margin-top: 3rem; color: var(--muted); font-size: .85rem; }
+@media (min-width: 40rem) { /* names stay in sight while a wide table scrolls */
+  .name:first-child { position: sticky; left: 0; background: var(--paper); }
+}
+@media (max-width: 40rem) { /* a meaning stands below its name and value, over the whole width */
+  body { padding: 1rem; }
+  .meanings thead { display: none; } .meanings tbody { display: block; }
+  .meanings tr { display: flex; flex-wrap: wrap; gap: 0 .8rem; padding: .3rem 0;
+    border-bottom: 1px solid var(--line); }
+  .meanings td { border: 0; padding: 0; }
+  .meanings td:last-child { flex-basis: 100%; color: var(--muted); }
+}
 @media print { nav { display: none; } details { display: block; } }
 """
 # Nothing is loaded, even if a text of the run contained markup: images are inline.
@@ -113,6 +132,8 @@ def table(header: Sequence[str], rows: Iterable[Sequence[object]], kinds: Sequen
 
     Also "unit" for powers, and "bar" for shares of 1.
     """
+    is_list = tuple(kinds[:2]) == ("name", "number") and not kinds[-1]
+    opening = '<table class="meanings">' if is_list else "<table>"
     classes = ["share" if kind == "bar" else kind for kind in kinds]
     top = "".join(
         _cell("th", escaped(cell), kind) for cell, kind in zip(header, classes, strict=True)
@@ -125,7 +146,7 @@ def table(header: Sequence[str], rows: Iterable[Sequence[object]], kinds: Sequen
         for row in rows
     ]
     body = "\n".join(f"<tr>{line}</tr>" for line in lines)
-    return f"<table>\n<thead><tr>{top}</tr></thead>\n<tbody>\n{body}\n</tbody>\n</table>"
+    return f"{opening}\n<thead><tr>{top}</tr></thead>\n<tbody>\n{body}\n</tbody>\n</table>"
 
 
 def picture(path: Path, caption: str) -> str:

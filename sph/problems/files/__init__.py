@@ -10,6 +10,7 @@ from pathlib import Path
 
 from sph.errors import FileError
 from sph.problems.files.contents import Contents, refusal
+from sph.problems.files.units import Conversion, convert
 
 # A configuration without a path uses this file, which `scripts/two_clouds.py` writes.
 SAMPLE = Path(__file__).parent / "two_clouds.hdf5"
@@ -19,34 +20,35 @@ ZIP = b"PK"  # an .npz file is a ZIP archive
 _last: list[Contents] = []  # of `read`, until `take`
 
 
-def read(path: str, dimension: int | None) -> Contents:
-    """Return the contents of a file, and keep them for `take`.
+def read(path: str, dimension: int | None, units: Conversion) -> Contents:
+    """Return the contents of a file in the units of the run, and keep them for `take`.
 
     dimension: number of space dimensions; that of the file if None. Raises FileError if the file
     cannot be read, is of another kind, or does not hold a valid initial state of gas.
     """
     _last.clear()
-    found = _read(path, dimension)
+    found = convert(_read(path, dimension), units)
     _last.append(found)
     return found
 
 
-def kept(path: str, sha256: str, dimension: int) -> Contents | None:
-    """Return the contents of the last `read` if that was of this file, or None."""
+def kept(path: str, sha256: str, dimension: int, units: Conversion) -> Contents | None:
+    """Return the contents of the last `read` if that was of this file in these units, or None."""
     for last in _last:
-        if (last.path, last.sha256, len(last.position)) == (path, sha256, dimension):
+        is_same = (last.path, last.sha256, len(last.position)) == (path, sha256, dimension)
+        if is_same and last.conversion == units.of(last):
             return last
     return None
 
 
-def take(path: str, sha256: str, dimension: int) -> Contents:
+def take(path: str, sha256: str, dimension: int, units: Conversion) -> Contents:
     """Return the contents of the last `read` if that was of this file, otherwise read it.
 
     Nothing is kept, so that the memory is free once the caller has used the arrays.
     """
-    found = kept(path, sha256, dimension)
+    found = kept(path, sha256, dimension, units)
     _last.clear()
-    return found or _read(path, dimension)
+    return found or convert(_read(path, dimension), units)
 
 
 def _read(path: str, dimension: int | None) -> Contents:

@@ -2,17 +2,22 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from sph.errors import FileError
+from sph.problems.base import Units
+
+if TYPE_CHECKING:
+    from sph.problems.files.units import Conversion
 
 NUMBERS = "fiu"  # kinds of NumPy types: floating-point, signed and unsigned
 
 
 @dataclass(eq=False)
 class Contents:
-    """An initial state in code units, and the box that the file states."""
+    """An initial state, and the box and the units that the file states."""
 
     path: str
     sha256: str
@@ -25,6 +30,9 @@ class Contents:
     others: Mapping[str, np.ndarray] = field(default_factory=dict)  # (N,) each
     names: Mapping[str, str] = field(default_factory=dict)  # of the datasets, for messages
     rounding: float = 0.0  # relative rounding error of the positions in the file
+    units: Units | None = None  # that the file states
+    unit_fault: str = ""  # why units that the file states cannot be used
+    conversion: "Conversion | None" = None  # that `sph.problems.files.units.convert` has made
 
 
 def refusal(path: str, found: str, expected: str, remedy: str = "") -> FileError:

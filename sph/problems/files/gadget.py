@@ -20,8 +20,17 @@ from sph.problems.files.contents import (
     rounding,
 )
 from sph.problems.files.lookup import DAMAGE, GAS, NAMES, Lookup
+from sph.problems.files.units import stated
 
 TYPES = ("gas", "dark matter", "disk", "bulge", "stars", "black holes or boundary", "neutrinos")
+
+# What states that space expands: group, attribute and its value without expansion.
+STATIC = (
+    ("Cosmology", "Cosmological run", 0),
+    ("Parameters", "ComovingIntegrationOn", 0),
+    ("Header", "Redshift", 0),
+    ("Header", "Scale-factor", 1),
+)
 
 
 def read(file: io.IOBase, path: str, dimension: int | None, digest: str) -> Contents:
@@ -74,6 +83,7 @@ class _File(Lookup):
             found.others = {"density": density}  # all zero: not known
         check(found)
         self._place(found, dim)
+        found.units, found.unit_fault = stated(self)
         self._sort(found)
         return found
 
@@ -104,13 +114,20 @@ class _File(Lookup):
                     f"Header/{name} is set: the file states entropies",
                     "internal energies per unit mass",
                 )
-        cosmology = self.get(self.file, "Cosmology")
-        if cosmology is not None and np.any(cosmology.attrs.get("Cosmological run", 0)):
-            raise refusal(
-                self.path,
-                "Cosmology/Cosmological run is set: lengths are comoving",
-                "a file without expansion of space",
-            )
+        self._check_expansion()
+
+    def _check_expansion(self) -> None:
+        """Raise FileError if lengths are comoving, as velocities then are too."""
+        for group, name, static in STATIC:
+            there = self.get(self.file, group)
+            if there is not None and name in there.attrs:
+                found = self.numbers(there, name)[0]
+                if found != static:
+                    raise refusal(
+                        self.path,
+                        f"{group}/{name} is {found:g}: lengths are comoving",
+                        f"a file without expansion of space, where {name} is {static}",
+                    )
 
     def _check_types(self) -> None:
         totals = self.header("NumPart_Total", self.header("NumPart_ThisFile", 0))

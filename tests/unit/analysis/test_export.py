@@ -10,6 +10,7 @@ from test_figures import drawable, state_of, write_run
 
 from sph import config, kernels
 from sph.analysis.export import fields, tables
+from sph.analysis.figures.profile import profile
 from sph.cli import main
 from sph.output import checkpoint
 from sph.scene import Scene
@@ -121,16 +122,32 @@ def test_profile_without_exact_solution_has_no_exact_columns():
 def test_profile_of_round_problem_is_over_the_radius():
     found = tables.profile(state_of("point_explosion", "problem.dimension=2").checkpoint)
     assert next(iter(found)) == "r"
-    # velocity is the radial component; the exact one has no other
-    assert np.abs(found["velocity_phi"]).max() < 1e-12
-    assert found["velocity"].max() > 0.1
+    assert np.abs(found["v_phi"]).max() < 1e-12  # the exact velocity is radial
+    assert found["v_r"].max() > 0.1
+    assert "velocity" not in found  # one name for each quantity
 
 
 def test_profile_of_rotating_gas_has_both_components_of_the_velocity():
     found = tables.profile(state_of("gresho").checkpoint)
-    for name in ("velocity", "velocity_phi"):
+    for name in ("v_r", "v_phi"):
         assert np.abs(found[name] - found[f"{name}_exact"]).max() < 1e-14, name
-    assert found["velocity_phi"].max() > 0.9
+    assert found["v_phi"].max() > 0.9
+
+
+@pytest.mark.parametrize("problem", ["gresho", "yee"])
+def test_export_and_figures_of_moving_vortex_have_one_centre(problem):
+    """At a time when the vortex has left the box through its upper right corner."""
+    state = state_of(problem, "problem.velocity=[3.0, 2.0]", time=1.75)
+    found, drawn = tables.profile(state.checkpoint), profile(state)
+    order = np.argsort(drawn.coordinate, kind="stable")
+    shown = drawn.coordinate.size  # figures leave out the corners of the box
+    assert 0.7 * found["r"].size < shown < found["r"].size
+    assert np.array_equal(found["r"][:shown], drawn.coordinate[order])
+    for name in ("v_r", "v_phi", "density"):
+        assert np.array_equal(found[name][:shown], drawn.fields[name][order]), name
+    # the state is the exact one: a rotation about the centre; 4 roundings of a speed of 4
+    assert np.abs(found["v_r"]).max() < 4 * 4 * 2.3e-16
+    assert found["v_phi"].max() > 0.7
 
 
 def text_table(path):

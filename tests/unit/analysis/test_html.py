@@ -190,7 +190,7 @@ def test_page_of_sweep_compares_its_runs(tmp_path):
     errors = {}
     for n in (40, 80):
         states = [state_of("shock_tube", f"problem.n={n}", time=t) for t in (0.0, 0.2)]
-        run = write_run(tmp_path / "sweep" / f"problem.n={n}", states)
+        run = write_run(tmp_path / "sweep" / f"problem.n={n},physics.alpha=1.0", states)
         norms = {name: 10.0 * value / n for name, value in {"L1": 0.25, "L2": 0.5}.items()}
         norms |= {"Linf": 1.5, "relative_L1": 0.125}
         errors[n] = norms["L1"]
@@ -206,6 +206,7 @@ def test_page_of_sweep_compares_its_runs(tmp_path):
     ):  # fmt: skip
         assert words in found.words, words
     assert "SIGTERM" in found.words
+    assert "problem.n=40, physics.alpha=1.0" in found.text  # a heading of a column, in two lines
     drawn = (tmp_path / "sweep" / "report").glob("*.png")
     assert found.tags.count("img") == len([*drawn]) > 0
 
@@ -217,3 +218,43 @@ def test_table_escapes_and_draws_shares():
     assert "width: 100.0%" in shown
     Page(shown)
     assert "length<sup>-D</sup></td>" in page.table(("a",), [("mass length^-D",)], ("unit",))
+
+
+def test_tables_with_meanings_become_lists_in_narrow_windows(ended, drawn):  # noqa: F811
+    made(ended.path)
+    text = (ended.path / "report.html").read_text(encoding="utf-8")
+    tables = re.findall(r"<table(.*?)>\n<thead>(.*?)</thead>", text)
+    lists = [given == ' class="meanings"' for given, head in tables if "meaning" in head]
+    assert len(lists) > 4
+    assert all(lists)
+    assert not any(given for given, head in tables if "meaning" not in head)
+    narrow = re.search(r"@media \(max-width: \d+rem\) \{(.*?)\n\}", page.STYLE, re.DOTALL)[1]
+    assert ".meanings tr { display: flex" in narrow
+
+
+def luminance(colour: str) -> float:
+    """Relative luminance of #rgb or #rrggbb (WCAG 2.2)."""
+    digits = colour[1:] if len(colour) == 7 else "".join(2 * one for one in colour[1:])
+    shares = [int(digits[start : start + 2], 16) / 255 for start in (0, 2, 4)]
+    linear = [one / 12.92 if one <= 0.04045 else ((one + 0.055) / 1.055) ** 2.4 for one in shares]
+    return float(np.dot([0.2126, 0.7152, 0.0722], linear))
+
+
+def contrast(one: str, other: str) -> float:
+    dark, light = sorted((luminance(one), luminance(other)))
+    return (light + 0.05) / (dark + 0.05)
+
+
+@pytest.mark.parametrize("is_dark", [False, True])
+def test_text_is_readable_on_light_and_dark_pages(is_dark):
+    blocks = re.findall(r":root {(.*?)}", page.STYLE, re.DOTALL)
+    light, dark = (dict(re.findall(r"--(\w+): (#\w+)", one)) for one in blocks)
+    assert set(dark) == set(light) == set(re.findall(r"var\(--(\w+)\)", page.STYLE))
+    colours = dark if is_dark else light
+    pairs = [("ink", "paper"), ("muted", "paper"), ("accent", "paper"), ("ink", "soft"),
+             ("ink", "note")]  # fmt: skip
+    # 4.5: level AA of the Web Content Accessibility Guidelines for text of this size
+    for text, behind in pairs:
+        assert contrast(colours[text], colours[behind]) > 4.5, (text, behind)
+    for shade in re.findall(r" background: (#\w+)", page.STYLE):  # of the states of a run
+        assert contrast("#fff", shade) > 4.5, shade

@@ -48,6 +48,8 @@ HDF5 = {
         put(NumPart_Total=[N, 5, 0, 0, 0, 0]), "", "type 1 (dark matter)",
     ),
     "entropies": (put(Flag_Entropy_ICs=[1, 0, 0, 0, 0, 0]), "", "Flag_Entropy_ICs"),
+    "redshift": (put(Redshift=9.0), "", "Header/Redshift is 9"),
+    "scale factor": (put(**{"Scale-factor": [0.5]}), "", "Header/Scale-factor is 0.5"),
     "outside the box": (changed((3, 1), 1.5, "Coordinates"), "", "PartType0/Coordinates"),
     "outside between mirrors": (
         changed((3, 1), -0.5, "Coordinates"), 'boundary = "mirror"\n', "particle 4",
