@@ -62,9 +62,10 @@ def gradients(
 
     Reads the velocity (D, N) in the middle of the step of length dt, the predicted density (N,) and
     the density (N,) `before` the step. Writes velocity_gradient (D, D, N), div_v (N,) and
-    density_rate (N,) in the middle of the step, and the correction of the kernel, of which the arrays are None that its
-    order does not need: order 0 has kernel_factor (N,) and kernel_gradient (D, N), order 1 has
-    kernel_matrix (D, D, N) and kernel_gradient, which is not zero where it falls back to order 0.
+    density_rate (N,) in the middle of the step, and the correction of the kernel, of which the
+    arrays are None that its order does not need: order 0 has kernel_factor (N,) and kernel_gradient
+    (D, N), order 1 has kernel_matrix (D, D, N) and kernel_gradient, which is not zero where it
+    falls back to order 0.
     """
     D, lanes, lists = len(dim), neighbours.lanes, neighbours.lists
     kernel, sym, full = models.kernel, symmetric_dim(dim), full_dim(dim)

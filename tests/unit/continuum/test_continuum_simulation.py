@@ -30,6 +30,7 @@ from sph.output import checkpoint
 from sph.output.run_directory import RunDirectory
 from sph.problems import base
 from sph.progress import suited
+from sph.scene import Scene
 
 # Of the sum of absolute terms: some hundred terms of a few operations, 1e-16 each.
 ROUND_OFF = 1e-13
@@ -248,6 +249,20 @@ interval = 0.1
 [run]
 threads = 1
 """
+
+
+def test_time_step_is_that_of_largest_stable_courant_number():
+    def first_step(courant):
+        clock = Clock()
+        scene = Scene(config.from_text(IMPACT).override([f"physics.C={courant}"]))
+        one = simulation.Simulation.start(scene, 1, clock)
+        one.close()
+        clock.close()
+        return one.limit.dt
+
+    largest = first_step(0.38)
+    assert first_step(0.37) == pytest.approx(0.37 / 0.38 * largest, rel=1e-12)
+    assert first_step(0.5) == largest
 
 
 def test_restart_continues_solids_bit_for_bit(tmp_path):
