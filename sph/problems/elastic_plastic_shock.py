@@ -30,7 +30,7 @@ class Problem(flyer_plate.Problem):
     limits: ClassVar = {
         "energy_drift": base.Limit(1e-4, "measured: 3.6e-5, in the first steps of the impact"),
         "elastic_limit_error": base.Limit(
-            0.02, "measured: 0.0016; 0.020 with 300 particles, where the two fronts overlap"
+            0.02, "measured: 0.0016; 0.019 with 300 particles, where the two fronts overlap"
         ),
         "precursor_speed_error": base.Limit(0.02, "measured: 3.2e-4 with 600 particles"),
         "shock_speed_error": base.Limit(0.02, "measured: 3.2e-4 with 600 particles"),
