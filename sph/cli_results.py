@@ -46,7 +46,8 @@ def map_options(command):
         click.option("--range", "limits", nargs=2, type=float, metavar="LO HI",
                      help="Ends of the scale of colours. Default: those of the values."),
         click.option("--field", type=click.Choice(MAP_FIELDS),
-                     help="Quantity to draw. Default: density, or stress of a solid."),
+                     help="Quantity to draw. Default: density; of a solid plastic strain, or von "
+                     "Mises stress if nothing has yielded."),
     ):  # fmt: skip
         command = option(command)
     return command

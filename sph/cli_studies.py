@@ -44,9 +44,10 @@ def sweep(config, varies, overrides, directory, jobs, scheduler, slurm, is_sure)
 @click.command()
 @click.argument("sources", metavar="DIR...", nargs=-1, required=True,
                 type=click.Path(path_type=Path))  # fmt: skip
-@click.option("--field", default="density", show_default=True, metavar="NAME",
+@click.option("--field", default="", metavar="NAME",
               help="Quantity to compare: a field such as density or velocity, or a number in "
-              "summary.json such as report.NAME.")  # fmt: skip
+              "summary.json such as report.NAME. Default: density; for runs without an exact "
+              "solution conservation.energy_drift_max.")  # fmt: skip
 @click.option("--norm", type=click.Choice(["L1", "L2", "Linf"]), default="L1", show_default=True,
               help="Norm of a field's error.")  # fmt: skip
 @click.option("--x", "cost", type=click.Choice(["cpu", "wall", "updates", "n"]), default="cpu",

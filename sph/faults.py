@@ -11,6 +11,9 @@ NEARER_UNITS = (
     f"other code units: expected values from {1.0 / LARGEST:g} to {LARGEST:g}, whose squares and "
     "cubes float64 can hold"
 )
+NOT_NEGATIVE = "an initial state whose masses, pressures and internal energies are not negative"
+
+FEW_OF_BOX = 0.02  # a smaller share of a closed box that particles extend over is noted
 
 TINY_C = 1e-3  # for smaller physics.C, short steps are intended
 
@@ -75,6 +78,24 @@ def smaller_steps(simulation) -> str:
     if not bounds.energy:
         remedies.append("physics.energy_limit = true")
     return ", ".join(remedies)
+
+
+def mostly_empty(scene, particles) -> str | None:
+    """Return a note that the particles are in a small part of a closed box, or None.
+
+    As in a file whose box has another unit than its positions.
+    """
+    problem = scene.config.problem
+    for axis, boundary in enumerate(problem.boundaries):
+        low, high = problem.box[axis]
+        share = np.ptp(particles.position[axis]) / (high - low)
+        if boundary != "open" and share < FEW_OF_BOX and particles.number > 1:
+            return (
+                f"the particles extend over {100.0 * share:.2g} % of the domain along "
+                f"{'xyz'[axis]}, [{low:g}, {high:g}], which is {boundary} there: check that "
+                "positions and box have one unit (problem.domain)"
+            )
+    return None
 
 
 def held_courant(scene) -> str | None:

@@ -4,7 +4,7 @@ from typing import Annotated, Any, NamedTuple, get_args, get_origin, get_type_hi
 
 
 class Parameter(NamedTuple):
-    """Annotation of a model's parameter: its help text and bounds. For example
+    """Annotation of a model's parameter: its help text, bounds and a valid value. For example
 
     strength: Annotated[float, Parameter("1 is the value of the paper", at_least=0.0)] = 1.0
     """
@@ -12,6 +12,7 @@ class Parameter(NamedTuple):
     help: str
     above: float | None = None
     at_least: float | None = None
+    example: Any = None  # shown to a user who gives a wrong value
 
 
 class Model:

@@ -21,7 +21,7 @@ CPU_SECONDS = "CPU s"
 
 # Least and largest unit of length, mass and time in cm, g and s: products of powers of units are
 # then finite numbers.
-UNIT_RANGE = (1e-40, 1e40)
+UNIT_RANGE = (1e-50, 1e50)
 
 
 class Quantity(NamedTuple):

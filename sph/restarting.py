@@ -8,7 +8,7 @@ import numpy as np
 
 from sph import config as configuration
 from sph import fingerprint
-from sph.analysis import reference, summary
+from sph.analysis import reference, summary, trial
 from sph.clock import Clock
 from sph.config import Config, outside, restarts
 from sph.config.restarts import Change
@@ -72,8 +72,11 @@ def restart(
             checkpoint, config=config, lineage=lineage, next_step=next_step,
             budget=_budget(checkpoint, target),
         )  # fmt: skip
+        with target.withdrawn_unless_begun(is_copy=True):
+            simulation = _resumed(begun, clock)
+            for note in trial.notes(simulation):
+                progress.note(note)
         _begin_anew(target, number, begun, config.recorded != checkpoint.config.recorded)
-        simulation = _resumed(begun, clock)
         if target.history.exists():
             history = History.resume(target.history, checkpoint.step)
         else:
@@ -243,6 +246,7 @@ def _place_to_go_on(
     if directory is None or (home is not None and is_same_path(directory, home.path)):
         return home, checkpoint_number(path)
     target = RunDirectory.create(directory)
+    target.make_room()
     if home is None:
         copy_file(path, target.checkpoint_path(0))
         return target, 0

@@ -1,13 +1,13 @@
 """The loop of a run over steps and outputs: checkpoints, history, progress and summary."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Set
 from contextlib import closing, contextmanager, suppress
 from pathlib import Path
 
 import numpy as np
 
-from sph import allocation, faults
-from sph.analysis import reference, summary
+from sph import allocation, columns, faults
+from sph.analysis import reference, summary, trial
 from sph.clock import Clock
 from sph.config import Config
 from sph.errors import DeclarationError, FileError, NumericalError, Stopped, first_line
@@ -29,34 +29,49 @@ from sph.threads import available_processors
 
 
 def run(config: Config, directory: RunDirectory, progress) -> dict:
-    """Run `config` from its initial state in an empty run directory. Return the summary.
+    """Run `config` from its initial state. Return the summary.
 
-    progress: see `sph.progress.Messages` and `Lines`. Raises NumericalError and Stopped, after the
-    files of the run are written, and FileError.
+    directory: its files of an earlier run are removed once there is an initial state. progress: see
+    `sph.progress.Messages` and `Lines`. Raises NumericalError and Stopped, after the files of the
+    run are written; FileError, ConfigError and others, before the first checkpoint without leaving
+    a run directory.
     """
-    with session(directory, config, progress) as (stopped_by, clock):
+    with (
+        session(directory, config, progress) as (stopped_by, clock),
+        directory.withdrawn_unless_begun(),
+    ):
         progress.note("preparing the initial state")
         for remark in config.problem.remarks():
             progress.note(remark)
-        simulation = Simulation.of_problem(Scene(config), threads_of(config), clock)
-        directory.write_config(config.to_toml())
-        if source := getattr(config.problem, "source", b""):
-            directory.write_problem(source)
-        if ended := simulation.relaxation:
-            spent = round(clock.seconds[PLACING], 4)
-            directory.write_relaxation({**ended._asdict(), "cpu_seconds": spent})
-        try:
-            simulation.begin()
-        except NumericalError as error:
-            raise _failed_at_start(error, simulation, directory) from error
-        if simulation.held_supports:
-            progress.note(
-                f"{simulation.held_supports} particle(s) have too few neighbours: their support "
-                f"radius is limited to {simulation.scene.max_support:.4g} (physics.max_support)"
-            )
-        history = new_history(config, simulation, directory)
-        runner = Runner(config, directory, simulation, history, progress, stopped_by)
-        return runner.from_start()
+        with closing(Simulation.of_problem(Scene(config), threads_of(config), clock)) as simulation:
+            directory.make_room()
+            directory.write_config(config.to_toml())
+            if source := getattr(config.problem, "source", b""):
+                directory.write_problem(source)
+            if ended := simulation.relaxation:
+                spent = round(clock.seconds[PLACING], 4)
+                directory.write_relaxation({**ended._asdict(), "cpu_seconds": spent})
+            _begin(simulation, directory, progress)
+            history = new_history(config, simulation, directory)
+            runner = Runner(config, directory, simulation, history, progress, stopped_by)
+            return runner.from_start()
+
+
+def _begin(simulation: Simulation, directory: RunDirectory, progress) -> None:
+    """Prepare the first step, and try a user's problem. Raises NumericalError and others."""
+    try:
+        simulation.begin()
+    except NumericalError as error:
+        raise _failed_at_start(error, simulation, directory) from error
+    if simulation.held_supports:
+        progress.note(
+            f"{simulation.held_supports} particle(s) have too few neighbours: their support "
+            f"radius is limited to {simulation.scene.max_support:.4g} (physics.max_support)"
+        )
+    if note := faults.mostly_empty(simulation.scene, simulation.particles):
+        progress.note(note)
+    for note in trial.notes(simulation):
+        progress.note(note)
 
 
 @contextmanager
@@ -81,7 +96,6 @@ def _failed_at_start(
     error: NumericalError, simulation: Simulation, directory: RunDirectory
 ) -> NumericalError:
     """Return the error with a table of neighbours; there is no history or checkpoint yet."""
-    simulation.close()
     words = offenders.leave(directory.offenders, state_of(simulation), error.particle)
     return NumericalError(f"{error}\n{words}".rstrip(), error.particle)
 
@@ -107,13 +121,14 @@ def state_of(simulation: Simulation, lineage: tuple[str, ...] = ()) -> Checkpoin
 
 
 def new_history(config: Config, simulation: Simulation, directory: RunDirectory) -> History:
-    extra = [*simulation.columns(), *config.problem.diagnostics(simulation.particles)]
-    if twice := sorted({name for name in extra if extra.count(name) > 1}):
+    problem = config.problem
+    there, own = [*simulation.columns()], [*problem.diagnostics(simulation.particles)]
+    if twice := sorted({*columns.shared(problem.dimension), *there} & {*own}):
         raise DeclarationError(
-            f"the columns {', '.join(twice)} of the history are declared by a part and by the "
-            f"problem {config.problem.name}"
+            f"the problem {problem.name}: diagnostics returned {', '.join(twice)}, which the "
+            "history has already; expected other names"
         )
-    return History.create(directory.history, config.problem.dimension, extra)
+    return History.create(directory.history, problem.dimension, [*there, *own])
 
 
 def threads_of(config: Config) -> int:
@@ -230,17 +245,26 @@ class Runner:
     def _record(self) -> None:
         """Add the rows of the steps since the last call to the history."""
         simulation, problem = self.simulation, self.config.problem
-        for columns in simulation.take_rows():
+        for row in simulation.take_rows():
             for name, before in (
                 ("wall_seconds", self.wall_before),
                 ("cpu_seconds", self.cpu_before),
             ):
-                columns[name] = [round(before + seconds, 6) for seconds in columns[name]]
+                row[name] = [round(before + seconds, 6) for seconds in row[name]]
             if problem.has_diagnostics:  # a row at a time
                 with simulation.clock.phase("diagnostics"):
                     found = problem.diagnostics(simulation.particles)
-                columns |= {name: [value] for name, value in found.items()}
-            self.history.extend(columns)
+                row |= {name: [value] for name, value in found.items()}
+                self._check_names(found.keys(), row.keys())
+            self.history.extend(row)
+
+    def _check_names(self, diagnostics: Set[str], columns: Set[str]) -> None:
+        known = {*self.history.columns}
+        if wrong := sorted((diagnostics - known) | (known - columns)):
+            raise DeclarationError(
+                f"the problem {self.config.problem.name}: diagnostics returned {', '.join(wrong)} "
+                "in some steps only; expected the names of the first step in all steps"
+            )
 
     def _write_checkpoint(self) -> None:
         """Flush the history, then write the checkpoint."""
@@ -259,17 +283,21 @@ class Runner:
         return state_of(self.simulation, self.lineage)
 
     def _close(self, status: str, reason: str | None = None) -> dict:
+        simulation = self.simulation
         self._record()
         self.history.flush()
-        self.simulation.end()
-        result = summary.of_run(
-            self.simulation,
-            read_history(self.directory.history),
-            status=status,
-            reason=reason,
-            lineage=self.lineage,
-            relaxation=self.directory.read_relaxation(),
-        )
+        simulation.end()
+        past = read_history(self.directory.history)
+        try:
+            result = summary.of_run(
+                simulation, past, status=status, reason=reason, lineage=self.lineage,
+                relaxation=self.directory.read_relaxation(),
+            )  # fmt: skip
+        except DeclarationError as error:
+            raise DeclarationError(
+                f"{error}\nThe checkpoints of the run are complete: mend the file, then "
+                f"`sph restart {quoted(self.directory.path)}` writes the summary."
+            ) from error.__cause__
         self.directory.write_summary(result)
         named = self.config.report.reference
         if named and status == "done":  # the summary is already written, if this fails

@@ -12,6 +12,7 @@ from numba.extending import register_jitable
 from sph.faults import (
     LARGEST,
     NEARER_UNITS,
+    NOT_NEGATIVE,
     drift_remedy,
     endless_sum,
     fault,
@@ -77,7 +78,9 @@ class Watchdog:
         ):
             bad = ~((values >= smallest) & (values < LARGEST))
             if bad.any():
-                raise fault_of(simulation, name, values, bad, NEARER_UNITS)
+                is_negative = smallest >= 0.0 and (values[bad] < 0.0).all()
+                remedy = NOT_NEGATIVE if is_negative else NEARER_UNITS
+                raise fault_of(simulation, name, values, bad, remedy)
 
     def check(self, simulation) -> None:
         """Raise NumericalError, which names a particle, if the state is unphysical."""

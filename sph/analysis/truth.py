@@ -7,6 +7,8 @@ import numpy as np
 
 from sph.config import Config
 
+NONE = "this problem has no exact solution"
+
 
 def departure(config: Config, time: float) -> str | None:
     """Why exact solution and theory do not hold for this configuration at `time`, or None."""
@@ -19,11 +21,13 @@ def departure(config: Config, time: float) -> str | None:
 
 def left_out(config: Config, time: float, position: np.ndarray) -> str | None:
     """Why errors against the exact solution cannot be taken at (D, N) particles, or None."""
+    problem, eos = config.problem, config.physics.eos_model()
+    if not problem.has_exact:
+        return NONE
     if reason := departure(config, time):
         return reason
-    problem, eos = config.problem, config.physics.eos_model()
     if problem.exact(eos, time, position[:, :1]) is None:
-        return "this problem has no exact solution"
+        return NONE
     inside, words = region(problem, eos, time, position)
     return None if inside.any() else f"no particle is in the region where errors are taken, {words}"
 

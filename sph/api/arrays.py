@@ -10,6 +10,7 @@ import numpy as np
 from pydantic import Field, PrivateAttr
 
 from sph import config as configuration
+from sph.api.concise import concise
 from sph.api.view import View
 from sph.clock import Clock
 from sph.errors import ConfigError
@@ -76,6 +77,7 @@ class Simulation(View):
     >>> wave.close()
     """
 
+    @concise
     def __init__(
         self,
         position: Any,
@@ -100,7 +102,10 @@ class Simulation(View):
             "output": {"interval": NEVER},
             "run": {"threads": threads, "precision": precision},
         }
-        config = configuration.from_tables(tables, source="sph.Simulation", problem=_Arrays)
+        try:
+            config = configuration.from_tables(tables, source="sph.Simulation", problem=_Arrays)
+        except ConfigError as error:
+            raise ConfigError(_with_own_names(str(error))) from None
         assert isinstance(config.problem, _Arrays)
         config.problem._start = start
         if fault := returned.fault_of_state(config.problem, start):
@@ -129,6 +134,7 @@ class Simulation(View):
         super().__init__(engine)
         self._columns: dict[str, list] = {}
 
+    @concise
     def advance(self, until: float) -> None:
         """Take time steps until the time `until`, at which the last one ends exactly.
 
@@ -165,6 +171,13 @@ class Simulation(View):
 
     def __exit__(self, *_: object) -> None:
         self.close()
+
+
+def _with_own_names(text: str) -> str:
+    """Return a message about keys of a configuration with the arguments that give them."""
+    for key, argument in (("domain", "box"), ("boundary", "boundary")):
+        text = text.replace(f"problem.{key}", argument)
+    return text.replace(" domain = ", " box = ")
 
 
 def _state(

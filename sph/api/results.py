@@ -10,6 +10,7 @@ import numpy as np
 
 from sph import config as configuration
 from sph.analysis import truth
+from sph.api.concise import concise
 from sph.api.particles import Particles
 from sph.config import Config
 from sph.output import checkpoint as checkpoints
@@ -31,6 +32,7 @@ class Checkpoint(Particles):
         super().__init__(lambda: self._read.particles, lambda: self._read.pressure)
 
     @cached_property
+    @concise
     def _read(self) -> checkpoints.Checkpoint:
         return checkpoints.read(self.path)
 
@@ -59,6 +61,7 @@ class Checkpoint(Particles):
         """SHA-256 of the state: equal for runs that are equal bit for bit."""
         return checkpoints.hash_of(self._read)
 
+    @concise
     def exact(self, position: np.ndarray | None = None) -> dict[str, np.ndarray] | None:
         """Return the exact solution at this time, None if there is none for this configuration.
 
@@ -127,17 +130,20 @@ class Run:
         return str(self._directory.read_summary().get("status", "unfinished"))
 
     @cached_property
+    @concise
     def config(self) -> Config:
         """The configuration with all defaults, one attribute for each table. Raises FileError."""
         path = self._directory.config
         return configuration.from_text(read_text(path), str(path))
 
     @cached_property
+    @concise
     def summary(self) -> Summary:
         """The content of summary.json, a dictionary. Raises FileError if the run has not ended."""
         return self._directory.whole_summary()
 
     @cached_property
+    @concise
     def history(self) -> dict[str, np.ndarray]:
         """The columns of history.csv by name, (steps,) each, with a row for each time step.
 
@@ -154,6 +160,7 @@ class Run:
         return f"<run in {self.directory}, {self.status}>"
 
 
+@concise
 def open(directory: str | os.PathLike[str]) -> Run:
     """Return the run in a run directory that `sph run` or `sph.run` wrote.
 

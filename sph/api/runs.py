@@ -12,6 +12,7 @@ from typing import Any, Literal
 from sph import config as configuration
 from sph import progress, runner
 from sph.analysis import reference
+from sph.api.concise import concise
 from sph.api.results import Run
 from sph.api.view import View
 from sph.config import Config
@@ -25,6 +26,7 @@ CALLBACK = "the callback"  # which stopped the run, in messages and in the summa
 log = logging.getLogger("sph")
 
 
+@concise
 def run(
     config: str | os.PathLike[str] | Mapping[str, Any] | Config,
     overrides: Sequence[str] | Mapping[str, Any] = (),

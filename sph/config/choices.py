@@ -148,7 +148,11 @@ def _fields(package: str, name: str) -> dict[str, tuple[Any, Any]]:
     return {
         key: (
             plain(kind, said.above, said.at_least, None),
-            Field(model._field_defaults.get(key, ...), description=said.help),
+            Field(
+                model._field_defaults.get(key, ...),
+                description=said.help,
+                examples=None if said.example is None else [said.example],
+            ),
         )
         for key, (kind, said) in parameters(model).items()
     }

@@ -42,12 +42,26 @@ def suggestion(name: str, valid: Iterable[str]) -> str:
     return f"did you mean {close}?" if close else f"expected one of {', '.join(valid) or 'none'}"
 
 
-def wrong_value(path: Path, value: Any, annotation: Any) -> Issue:
-    """Return the issue that `value` does not match `annotation`, the type of its key."""
-    hint = ""
+def wrong_value(path: Path, value: Any, annotation: Any, example: Any = None) -> Issue:
+    """Return the issue that `value` does not match `annotation`, the type of its key.
+
+    example: a valid value of the key, None if no example is known.
+    """
+    kinds = [_plain(one)[0] for one in branches(annotation)]
+    hint = _such_as(path, example)
     if isinstance(value, str) and (close := nearest(value, valid_names(annotation))):
         hint = f'; did you mean "{close}"?'
+    elif isinstance(value, float) and value.is_integer() and int in kinds:
+        hint = _such_as(path, int(value))
+    elif isinstance(value, dict) and any(_is_list_of_tables(one) for one in kinds):
+        hint = f". Try: [[{dotted(path)}]] for each, in place of [{dotted(path)}]"
     return Issue(path, f"= {_found(value)}: expected {describe(annotation)}{hint}")
+
+
+def _such_as(path: Path, example: Any) -> str:
+    """Return the end of a message with an example of the key that a path leads to."""
+    key = next((str(step) for step in reversed(path) if isinstance(step, str)), "")
+    return "" if example is None else f", such as {key} = {value_text(example)}"
 
 
 def not_finite(value: Any, path: Path = ()) -> Iterator[Issue]:
@@ -109,6 +123,10 @@ def _choice(said: list[Any]) -> Any:
     return next((one for one in said if hasattr(one, "valid_names")), None)
 
 
+def _is_list_of_tables(bare: Any) -> bool:
+    return typing.get_origin(bare) is list and _is_table(_plain(typing.get_args(bare)[0])[0])
+
+
 def _is_table(bare: Any) -> bool:
     return isinstance(bare, type) and issubclass(bare, BaseModel)
 
@@ -129,7 +147,8 @@ def _length(said: list[Any]) -> str:
     high = next((one.max_length for one in said if hasattr(one, "max_length")), None)
     if high is not None:
         return f"{high} " if low == high else f"{low or 0} to {high} "
-    return f"at least {low} " if low else ""
+    words = {None: "", 0: "", 1: "one or more "}
+    return words.get(low, f"at least {low} ")
 
 
 def describe(annotation: Any, plural: bool = False) -> str:
@@ -145,7 +164,9 @@ def describe(annotation: Any, plural: bool = False) -> str:
         return f"{', '.join(most)} or {last}" if most else last
     if typing.get_origin(bare) is list:
         entries = describe(typing.get_args(bare)[0], plural=True)
-        return f"{'lists' if plural else 'a list'} of {_length(said)}{entries}"
+        words = next((one for one in said if isinstance(one, str)), "")  # in place of a number
+        length = "" if words else _length(said)
+        return f"{'lists' if plural else 'a list'} of {length}{entries}" + (words and f", {words}")
     if _is_table(bare):
         return ("tables" if plural else "a table") + f" {{ {', '.join(bare.model_fields)} }}"
     if typing.get_origin(bare) is dict:
@@ -276,12 +297,25 @@ def _issues(
         case "value_error" | "assertion_error":
             return [Issue(path, f": {error['ctx']['error']}")]
         case "missing":
-            annotation = inner(model, located.path)
-            return [Issue(path, f"is missing: expected {describe(annotation)}")]
+            annotation, example = inner(model, located.path), _example(model, located.path)
+            text = f"is missing: expected {describe(annotation)}"
+            return [Issue(path, text + _such_as(path, example))]
         case "extra_forbidden":
             holder = inner(model, located.path[:-1])
             return [_unknown_key(path, holder, elsewhere if len(path) == 2 else {})]
-    return [wrong_value(path, error["input"], inner(model, located.path))]
+    annotation, example = inner(model, located.path), _example(model, located.path)
+    return [wrong_value(path, error["input"], annotation, example)]
+
+
+def _example(model: type[BaseModel], path: Path) -> Any:
+    """Return the example of the key at `path`, or that holds the entry at `path`, or None."""
+    while path and isinstance(path[-1], int):
+        path = path[:-1]
+    for one in branches(inner(model, path[:-1])) if path else ():
+        holder, _ = _plain(one)
+        if _is_table(holder) and path[-1] in holder.model_fields:
+            return (holder.model_fields[path[-1]].examples or [None])[0]
+    return None
 
 
 def _unknown_key(path: Path, holder: Any, elsewhere: dict[str, str]) -> Issue:

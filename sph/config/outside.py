@@ -1,7 +1,7 @@
 """Problems from outside the package: in a Python file, or in an installed distribution.
 
 The class found is extended by the keys that record where it came from. Exceptions in its methods
-become errors that name file and line.
+become errors that name file and line (`sph.config.reporting`).
 """
 
 import functools
@@ -9,21 +9,21 @@ import hashlib
 import importlib.metadata
 import os
 import sys
-import traceback
-from collections.abc import Callable, Iterator
-from contextlib import AbstractContextManager, contextmanager, nullcontext
+from collections.abc import Mapping
+from contextlib import AbstractContextManager, nullcontext
 from inspect import getattr_static
 from types import FunctionType, ModuleType
-from typing import Any, ClassVar, Literal
+from typing import Any, ClassVar, Literal, TypeGuard
 
-from pydantic import Field, ValidationError, create_model
+from pydantic import Field, create_model
 
 from sph import registry
+from sph.config.reporting import check_signature, reported, reporting
 from sph.config.restarts import RECORDED
 from sph.config.sections import SECTIONS
-from sph.errors import DeclarationError, SphError
+from sph.errors import DeclarationError
 from sph.problems import base
-from sph.problems.support import returned
+from sph.quantity import FIELDS, Quantity
 
 PACKAGE = "sph.problems"
 GROUP = "sph.problems"  # of entry points: NAME = "module" or "module:Class"
@@ -104,6 +104,13 @@ def of_file(path: str) -> tuple[type[Outside], str]:
     return _of_source(path, source), hashlib.sha256(source).hexdigest()
 
 
+def has_changed(problem: base.Problem) -> TypeGuard[Outside]:
+    """Return whether a problem was read from another file than the one whose SHA-256 it records."""
+    if not isinstance(problem, Outside) or not problem.source:
+        return False
+    return hashlib.sha256(problem.source).hexdigest() != problem.model_dump()["file_sha256"]
+
+
 @functools.cache
 def _of_source(path: str, source: bytes) -> type[Outside]:
     stem = os.path.splitext(os.path.basename(path))[0]
@@ -132,7 +139,7 @@ def _of_source(path: str, source: bytes) -> type[Outside]:
     )
     name = {"name": _fixed(stem)} if found.model_fields["name"].is_required() else {}
     made = _extended(found, path, **name, file=(str, file), file_sha256=(str, digest))
-    made.source = source
+    made.source, made.paths = source, ("file", *found.paths)
     return made
 
 
@@ -145,6 +152,7 @@ def _fixed(name: str) -> tuple[Any, str]:
 def _extended(found: type[base.Problem], origin: str, **keys: Any) -> type[Outside]:
     """Return a subclass with more keys, whose methods report errors (`reported`)."""
     _check_defaults(found, origin)
+    _check_attributes(found, origin)
     made: Any = create_model("Problem", __base__=(found, Outside), __doc__=found.__doc__, **keys)
     made.origin, made.filled_in = origin, (*found.filled_in, *SOURCES)
     for name, ours in vars(base.Problem).items():
@@ -152,12 +160,38 @@ def _extended(found: type[base.Problem], origin: str, **keys: Any) -> type[Outsi
         if name.startswith("_") or own is ours:
             continue
         if isinstance(own, FunctionType):
-            setattr(made, name, _reporting(own, origin))
+            check_signature(own, ours, origin)
+            setattr(made, name, reporting(own, origin))
         elif isinstance(own, classmethod):
-            setattr(made, name, classmethod(_reporting(own.__func__, origin)))
+            setattr(made, name, classmethod(reporting(own.__func__, origin)))
         elif isinstance(own, property) and own.fget:
-            setattr(made, name, property(_reporting(own.fget, origin)))
+            setattr(made, name, property(reporting(own.fget, origin)))
     return made
+
+
+def _check_attributes(found: type[base.Problem], origin: str) -> None:
+    """Raise DeclarationError for class attributes that only figures and the summary read."""
+    known = FIELDS.keys() - {"x", "r", "velocity_phi", "column_density"}
+    unknown = [name for name in found.profiles if name not in known]
+    if unknown or len(found.profiles) != 4:
+        raise DeclarationError(
+            f"{origin}: profiles = {found.profiles!r}; expected four of {', '.join(sorted(known))}"
+        )
+    for attribute, kind in (
+        ("limits", base.Limit), ("swamped", base.Limit), ("quantities", Quantity)
+    ):  # fmt: skip
+        given = getattr(found, attribute)
+        for name, value in given.items() if isinstance(given, Mapping) else [("", given)]:
+            if not isinstance(value, kind):
+                raise DeclarationError(
+                    f"{origin}: {attribute} has {name!r}: {value!r}; expected a dictionary of "
+                    f"{kind.__module__}.{kind.__name__} by name"
+                )
+
+
+def validating(model: type) -> AbstractContextManager:
+    """Return the context in which keys of that class are validated: validators may be a user's."""
+    return reported(model.origin) if issubclass(model, Outside) else nullcontext()
 
 
 def _check_defaults(found: type[base.Problem], origin: str) -> None:
@@ -173,64 +207,23 @@ def _check_defaults(found: type[base.Problem], origin: str) -> None:
             )
 
 
-def _reporting(method: Callable, origin: str) -> Callable:
-    """Return a method that raises DeclarationError for exceptions and wrong returned values."""
-    fault_of = returned.CHECKS.get(method.__name__)
-
-    @functools.wraps(method)
-    def reporting(self, *arguments, **named):
-        with reported(origin, method.__name__):
-            found = method(self, *arguments, **named)
-            fault = fault_of(self, found, *arguments, **named) if fault_of else ""
-        if fault:
-            raise DeclarationError(f"{origin}: {method.__name__} returned {fault}")
-        return found
-
-    return reporting
-
-
-def validating(model: type) -> AbstractContextManager:
-    """Return the context in which keys of that class are validated: validators may be a user's."""
-    return reported(model.origin) if issubclass(model, Outside) else nullcontext()
-
-
-@contextmanager
-def reported(origin: str, method: str = "") -> Iterator[None]:
-    """Raise DeclarationError, with file and line, for exceptions of a problem from outside.
-
-    Errors with a meaning stay: those of sph, those of validation, and ValueError of `under`.
-    """
-    try:
-        yield
-    except (SphError, ValidationError):
-        raise
-    except Exception as error:
-        if isinstance(error, ValueError) and method == "under":
-            raise
-        where = _place(error, origin) + (f", in {method}" if method else "")
-        text = f"{type(error).__name__}: {error}".rstrip(": ")
-        if isinstance(error, SyntaxError) and error.lineno:
-            where, text = f"{error.filename}, line {error.lineno}", f"SyntaxError: {error.msg}"
-        raise DeclarationError(f"{where}: {text}") from error
-
-
-def _place(error: Exception, origin: str) -> str:
-    """Return file and line of the last call in the file of the problem."""
-    frames = traceback.extract_tb(error.__traceback__)
-    inside = [one for one in frames if one.filename == origin]
-    return f"{origin}, line {inside[-1].lineno}" if inside else origin
-
-
 def _class_in(module: ModuleType, where: str) -> type[base.Problem]:
     if not hasattr(module, "Problem"):
-        raise DeclarationError(f"{where}: expected a class Problem")
+        others = [name for name, one in vars(module).items() if _is_problem(one)]
+        instead = f", but it has {', '.join(others)}" if others else ""
+        raise DeclarationError(f"{where}: expected a class Problem{instead}")
     return _checked(module.Problem, where)
 
 
+def _is_problem(found: Any) -> bool:
+    return isinstance(found, type) and issubclass(found, base.Problem)
+
+
 def _checked(found: Any, where: str) -> type[base.Problem]:
-    if not isinstance(found, type) or not issubclass(found, base.Problem):
+    if not _is_problem(found):
         raise DeclarationError(
-            f"{where}: Problem is not a subclass of sph.problems.base.Problem, as it must be"
+            f"{where}: Problem is not a subclass of sph.problems.base.Problem, as it must be.\n"
+            "Try: `from sph.problems import base`, and class Problem(base.Problem)."
         )
     if found is base.Problem or found.initial is base.Problem.initial:
         raise DeclarationError(f"{where}: expected a class Problem with a method initial")

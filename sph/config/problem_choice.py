@@ -52,7 +52,7 @@ def _in_file(
     except DeclarationError as error:
         if run:
             raise FileError(
-                f"{run} needs its problem file: {error}.\nTry: put the file back; problem.py in "
+                f"{run} needs its problem file: {error}\nTry: put the file back; problem.py in "
                 "the run directory is a copy, as the file was when the run began."
             ) from error
         issues.append(Issue(path, f"= {value_text(name)}: {error}"))

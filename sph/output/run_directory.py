@@ -1,24 +1,22 @@
 """The run directory: the paths of its files, and which of them may be replaced."""
 
-import fcntl
 import json
 import os
 import re
 import shutil
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
 
-from sph.errors import FileError
-from sph.output import checkpoint, history, same_run
+from sph.errors import FileError, NumericalError
+from sph.output import checkpoint, history, locks, same_run
 from sph.output.checkpoint import Checkpoint
 from sph.output.files import (
     Damaged,
     explained,
-    holding,
     is_same_path,
     is_unfinished,
     opened,
@@ -35,6 +33,9 @@ from sph.summary import Summary, of_json
 
 CHECKPOINT_NAME = re.compile(r"checkpoint_(\d{6,})\.h5")
 
+# The end of a message on a run without checkpoints.
+AGAIN = "\nTry: `sph run`, to start the run again."
+
 # A checkpoint of a failed run is valid if its energy drift is below this fraction of
 # physics.max_energy_drift: shortly before a failure the drift grows by more than that per step.
 GOOD = 0.1
@@ -48,18 +49,25 @@ MARK = "# The resolved configuration of a run of sph.\n"
 
 @dataclass(frozen=True)
 class RunDirectory:
-    """Paths in a run directory. Only `path` and `path`/checkpoints must exist."""
+    """Paths in a run directory. Only `path` and `path`/checkpoints must exist.
+
+    made: config.toml and directories that did not exist before `create`, the innermost first.
+    """
 
     path: Path
+    made: tuple[Path, ...] = field(default=(), compare=False, repr=False)
 
     @classmethod
     def create(cls, path: Path, force: bool = False) -> "RunDirectory":
-        """Create an empty run directory at `path`, and its parents.
+        """Create a run directory at `path`, and its parents.
 
-        With `force`, the files of an earlier run in it are removed, and no others. Raises FileError
-        if `path` holds other files, or an earlier run and `force` is false.
+        Files of an earlier run stay until `make_room`. Raises FileError if `path` holds other
+        files, or an earlier run and `force` is false.
         """
-        run = cls(Path(path))
+        path = Path(path)
+        inside = (path / name for name in ("config.toml", "checkpoints", "frames"))
+        paths = (*inside, path, *path.parents)
+        run = cls(path, tuple(one for one in paths if not one.exists()))
         with explained(f"cannot write to {path}"):
             if run.path.exists() and not run.path.is_dir():
                 raise FileError(f"{path} is a file.\nTry: another directory, with -o.")
@@ -72,8 +80,8 @@ class RunDirectory:
             refuse_link(run._checkpoint_directory)
             run._checkpoint_directory.mkdir(parents=True, exist_ok=True)
             with run.alone():
-                if there:
-                    run._make_room(force)
+                if there and not force:
+                    run._refuse_begun()
                 run._remove_unfinished()
         return run
 
@@ -150,15 +158,15 @@ class RunDirectory:
         Raises Damaged if there is none, and FileError if a later one cannot be read, since that one
         may be valid.
         """
-        reason = "it has no checkpoints.\nTry: `sph run`, to start the run again"
+        reason = f"has no checkpoint.{AGAIN}"
         for path in reversed(self.checkpoints()):
             try:
                 checkpoint.read(path)
             except Damaged as error:
-                reason = str(error)
+                reason = f"has no valid checkpoint: {error}"
             else:
                 return path
-        raise Damaged(f"{self.path} cannot be restarted: {reason}")
+        raise Damaged(f"{self.path} {reason}")
 
     def last_good(self) -> Path:
         """Return the last checkpoint of a failed run that was written before its energy drifted.
@@ -255,62 +263,67 @@ class RunDirectory:
 
     def is_running(self) -> bool | None:
         """Return whether a process has locked the directory; None on file systems without locks."""
-        try:
-            descriptor = os.open(self._checkpoint_directory, os.O_RDONLY | os.O_DIRECTORY)
-        except OSError:  # moved or removed
-            return False
-        try:
-            fcntl.flock(descriptor, fcntl.LOCK_SH | fcntl.LOCK_NB)
-        except BlockingIOError:
-            return True
-        except OSError:
-            return None
-        else:
-            return False
-        finally:
-            os.close(descriptor)
+        return locks.is_held(self._checkpoint_directory)
 
     @contextmanager
     def alone(self) -> Iterator[None]:
         """Lock the directory within the block. Raises FileError if another process has locked it.
 
-        Files are written to the locked directory even if another one takes its place. On file
-        systems without locks, nothing is locked.
+        Files are written to the locked directory even if another one takes its place.
         """
-        with explained(f"cannot open {self.path}"):
-            flags = os.O_RDONLY | os.O_DIRECTORY
-            home = os.open(self.path, flags)
-            descriptor = os.open("checkpoints", flags | os.O_NOFOLLOW, dir_fd=home)
-        try:
-            try:
-                fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            except BlockingIOError:
-                raise FileError(
-                    f"{self.path} is in use by another run of sph.\n"
-                    "Try: wait until that run has ended, or another directory, with -o."
-                ) from None
-            except OSError:
-                pass  # this file system has no locks
-            with holding({self.path: home, self._checkpoint_directory: descriptor}):
-                yield
-        finally:
-            os.close(descriptor)
-            os.close(home)
+        with locks.held(self.path, self._checkpoint_directory):
+            yield
 
-    def _make_room(self, force: bool) -> None:
-        begun = self.checkpoints() or (self.history.exists() and not self._ended_at_once())
-        if begun and not force:
+    def _refuse_begun(self) -> None:
+        if self.checkpoints() or (self.history.exists() and not self._ended_at_once()):
             raise FileError(
-                f"{self.path} already holds a run.\nTry: --force to replace it, "
-                f"`sph restart {quoted(self.path)}` to continue it, or another directory, with -o."
+                f"{self.path} already holds a run.\nTry: --force (in Python force=True) to replace "
+                f"it, `sph restart {quoted(self.path)}` to continue it, or another directory, with "
+                "-o (output=)."
             )
-        if self.figures.is_dir() and not self.figures.is_symlink():
-            shutil.rmtree(self.figures)
-        files = (self.history, self.summary, self.offenders, self.problem, self.relaxation)
-        for path in (*files, *self.checkpoints()):
-            path.unlink(missing_ok=True)
-        self.frames.drop_after(-1)
-        self.write_config("")  # keeps MARK, so that this remains a run directory
+
+    def make_room(self) -> None:
+        """Remove the files of an earlier run, and no others. Raises FileError."""
+        with explained(f"cannot remove the files of an earlier run in {self.path}"):
+            if self.figures.is_dir() and not self.figures.is_symlink():
+                shutil.rmtree(self.figures)
+            files = (self.history, self.summary, self.offenders, self.problem, self.relaxation)
+            for path in (*files, *self.checkpoints()):
+                path.unlink(missing_ok=True)
+            self.frames.drop_after(-1)
+            if self.config.exists():
+                self.write_config("")  # keeps MARK, so that this remains a run directory
+
+    @contextmanager
+    def withdrawn_unless_begun(self, is_copy: bool = False) -> Iterator[None]:
+        """If the block fails before there is a checkpoint, remove what it made of the directory.
+
+        is_copy: whether checkpoints in a directory that `create` made are only copies.
+
+        A NumericalError leaves the directory, with its configuration and offenders.h5. Files of an
+        earlier run stay if the block fails before `make_room`.
+        """
+        try:
+            yield
+        except NumericalError:
+            raise
+        except BaseException:
+            if not self.checkpoints() or (is_copy and self.path in self.made):
+                with suppress(OSError, FileError):
+                    self.make_room()
+            self._remove_made()
+            raise
+
+    def _remove_made(self) -> None:
+        """Remove config.toml and the directories that `create` made, unless a file is left."""
+        if self.checkpoints():
+            return
+        with suppress(OSError):
+            for one in self.made:
+                if one.is_dir():
+                    one.rmdir()
+                else:
+                    one.unlink(missing_ok=True)
 
     def _ended_at_once(self) -> bool:
         """Return whether the run ended in its first step, so that nothing of value is lost."""

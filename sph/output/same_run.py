@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from sph import config as configuration
-from sph.config.outside import SOURCES
+from sph.config.outside import SOURCES, has_changed
 from sph.errors import ConfigError, FileError
 from sph.output import history
 from sph.output.checkpoint import Checkpoint
@@ -43,7 +43,16 @@ def check_history(path: Path, checkpoint: Checkpoint) -> None:
         }
         diagnostics = list(config.problem.diagnostics(p))
     optional = checkpoint.scene.columns
-    history.check(path, p.dimension, diagnostics, optional, checkpoint.step, sums)
+    try:
+        history.check(path, p.dimension, diagnostics, optional, checkpoint.step, sums)
+    except FileError as error:
+        if not has_changed(config.problem):
+            raise
+        found = ", ".join(diagnostics) or "none"
+        raise FileError(
+            f"{config.problem.origin} has changed since the run began, and its diagnostics "
+            f"({found}) may not be those of the run any more: {error}"
+        ) from None
 
 
 def check_order(earlier: Path, later: Path, before: Checkpoint, after: Checkpoint) -> None:

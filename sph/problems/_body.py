@@ -20,6 +20,7 @@ class Body(Shaped):
     centre: Point | None = Field(
         default=None,
         description="centre of all other shapes; on a mirror, the half inside the domain is placed",
+        examples=[[0.5, 0.5]],
     )
     lattice: Literal["cubic", "hexagonal", "bcc", "fcc"] = Field(
         default="cubic",
@@ -30,7 +31,9 @@ class Body(Shaped):
         description="(volume of a particle)^(1/D), adjusted to fit the shape; if not given, the "
         "same for all bodies without it, so that these have problem.n particles",
     )
-    velocity: Point | None = Field(default=None, description="velocity; at rest if not given")
+    velocity: Point | None = Field(
+        default=None, description="velocity; at rest if not given", examples=[[0.1, 0.0]]
+    )
     material: str | None = Field(
         default=None, description="name in physics.materials; required if that is given"
     )

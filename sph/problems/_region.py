@@ -1,11 +1,11 @@
 """The table [[problem.region]]: a shape, and the gas in it."""
 
-from typing import ClassVar, Literal
+from typing import Annotated, ClassVar, Literal
 
 import numpy as np
 from pydantic import Field
 
-from sph.problems._shapes import KEYS, Point, Shaped
+from sph.problems._shapes import KEYS, PER_AXIS, Point, Shaped
 from sph.problems.base import Fault
 from sph.problems.support import areas, bodies
 from sph.problems.support.expressions import Expression, parsed
@@ -39,22 +39,37 @@ class Region(Shaped):
         "periodic boundaries repeat all shapes but a half-plane"
     )
     axis: Literal["x", "y", "z"] | None = Field(
-        default=None, description="axis of a cylinder or tube; axis that is normal to a slab"
+        default=None,
+        description="axis of a cylinder or tube; axis that is normal to a slab",
+        examples=["x"],
     )
     range: list[float] | None = Field(
-        default=None, min_length=2, max_length=2, description="ends [lo, hi] of a slab along axis"
+        default=None,
+        min_length=2,
+        max_length=2,
+        description="ends [lo, hi] of a slab along axis",
+        examples=[[0.0, 0.5]],
     )
-    point: Point | None = Field(default=None, description="a point on the edge of a half-plane")
+    point: Point | None = Field(
+        default=None, description="a point on the edge of a half-plane", examples=[[0.5, 0.5]]
+    )
     normal: Point | None = Field(
-        default=None, description="vector from the edge of a half-plane into it, of any length"
+        default=None,
+        description="vector from the edge of a half-plane into it, of any length",
+        examples=[[1.0, 0.0]],
     )
-    density: Value | None = Field(default=None, description=f"density: {EXPRESSION}")
-    pressure: Value | None = Field(default=None, description=f"pressure: {EXPRESSION}")
-    velocity: list[Value] | None = Field(
+    density: Value | None = Field(
+        default=None, description=f"density: {EXPRESSION}", examples=["1 + 0.1*sin(2*pi*x)"]
+    )
+    pressure: Value | None = Field(
+        default=None, description=f"pressure: {EXPRESSION}", examples=["1 + exp(-(r/0.1)**2)"]
+    )
+    velocity: Annotated[list[Value], PER_AXIS] | None = Field(
         default=None,
         min_length=1,
         max_length=3,
         description="velocity, one number or expression per axis; zero if no region gives one",
+        examples=[["-y", 0.5]],
     )
 
     def faults(self, dimension: int) -> list[Fault]:

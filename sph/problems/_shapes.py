@@ -1,6 +1,7 @@
 """Tables of the configuration that give a shape and its sizes."""
 
-from typing import Annotated, ClassVar, Literal
+import json
+from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import Field, model_validator
 
@@ -20,7 +21,8 @@ KEYS = {
 DIMENSION = {"disc": 2, "ring": 2, "sphere": 3, "cylinder": 3, "tube": 3}
 
 Length = Annotated[float, Field(gt=0.0)]
-Point = Annotated[list[float], Field(min_length=1, max_length=3)]
+PER_AXIS = "one per axis"  # in messages, for the number of entries
+Point = Annotated[list[float], Field(min_length=1, max_length=3), PER_AXIS]
 
 
 class Shaped(base.Section):
@@ -33,41 +35,78 @@ class Shaped(base.Section):
     vectors: ClassVar[tuple[str, ...]] = ("low", "high", "centre")
 
     shape: str
-    low: Point | None = Field(default=None, description="lower corner of a box")
-    high: Point | None = Field(default=None, description="upper corner of a box")
+    low: Point | None = Field(
+        default=None, description="lower corner of a box", examples=[[0.0, 0.0]]
+    )
+    high: Point | None = Field(
+        default=None, description="upper corner of a box", examples=[[0.5, 1.0]]
+    )
     centre: Point | None = Field(
-        default=None, description="centre of a disc, sphere, ring, cylinder or tube"
+        default=None,
+        description="centre of a disc, sphere, ring, cylinder or tube",
+        examples=[[0.5, 0.5]],
     )
     radius: Length | None = Field(
-        default=None, description="radius of a disc, a sphere or a cylinder"
+        default=None, description="radius of a disc, a sphere or a cylinder", examples=[0.2]
     )
-    inner: Length | None = Field(default=None, description="inner radius of a ring or tube")
-    outer: Length | None = Field(default=None, description="outer radius of a ring or tube")
-    length: Length | None = Field(default=None, description="length of a cylinder or tube")
+    inner: Length | None = Field(
+        default=None, description="inner radius of a ring or tube", examples=[0.1]
+    )
+    outer: Length | None = Field(
+        default=None, description="outer radius of a ring or tube", examples=[0.2]
+    )
+    length: Length | None = Field(
+        default=None, description="length of a cylinder or tube", examples=[1.0]
+    )
     axis: Literal["x", "y", "z"] | None = Field(
-        default=None, description="axis of a cylinder or tube"
+        default=None, description="axis of a cylinder or tube", examples=["x"]
     )
 
-    @model_validator(mode="after")
-    def _has_its_sizes(self):
-        needed = self.shapes[self.shape]
-        sizes = dict.fromkeys(key for keys in self.shapes.values() for key in keys)
-        given = [name for name in sizes if getattr(self, name) is not None]
-        expected = f'expected {", ".join(needed) or "none"} for shape = "{self.shape}"'
-        faults = [Fault((k,), f"is missing: {expected}") for k in needed if k not in given]
+    @model_validator(mode="before")
+    @classmethod
+    def _has_its_keys(cls, given: Any) -> Any:
+        """Before the types of values: a key of another shape is the wrong key, whatever it has."""
+        shape = given.get("shape") if isinstance(given, dict) else None
+        if not isinstance(shape, str) or shape not in cls.shapes:
+            return given
+        if given.keys() - cls.model_fields.keys():
+            return given  # a misspelt key, such as center, is not a missing one
+        needed = cls.shapes[shape]
+        sizes = dict.fromkeys(key for keys in cls.shapes.values() for key in keys)
+        has = [name for name in sizes if given.get(name) is not None]
+        expected = f'expected {", ".join(needed) or "none"} for shape = "{shape}"'
+        whole = f"{expected}, such as {cls._example(shape)}" if needed else expected
+        faults = [Fault((k,), f"is missing: {whole}") for k in needed if k not in has]
         faults += [
-            Fault((k,), f'is not a key of shape "{self.shape}": {expected}')
-            for k in given
+            Fault((k,), f'is not a key of shape "{shape}": {expected if faults else whole}')
+            for k in has
             if k not in needed
         ]
-        corners = zip(self.low or (), self.high or (), strict=False)
-        if not faults and any(low >= high for low, high in corners):
-            faults = [Fault(("low",), f"= {self.low}: expected below high = {self.high}")]
-        if not faults and "inner" in needed and not self.inner < self.outer:  # type: ignore[operator]
-            faults = [Fault(("inner",), f"= {self.inner:g}: expected below outer = {self.outer:g}")]
         if faults:
             raise base.refused(faults)
+        return given
+
+    @model_validator(mode="after")
+    def _has_sizes_in_order(self):
+        corners = zip(self.low or (), self.high or (), strict=False)
+        if any(low >= high for low, high in corners):
+            raise base.refused(
+                [Fault(("low",), f"= {self.low}: expected below high = {self.high}")]
+            )
+        if self.inner is not None and self.outer is not None and not self.inner < self.outer:
+            text = f"= {self.inner:g}: expected below outer = {self.outer:g}"
+            raise base.refused([Fault(("inner",), text)])
         return self
+
+    @classmethod
+    def _example(cls, shape: str) -> str:
+        """Return the table of a shape as a user writes it."""
+        number = DIMENSION.get(shape, 2)
+        keys = [("shape", shape)]
+        for key in cls.shapes[shape]:
+            value = (cls.model_fields[key].examples or [None])[0]
+            keys.append((key, value + value[:1] if key in cls.vectors and number == 3 else value))
+        return f"{{ {', '.join(f'{key} = {json.dumps(value)}' for key, value in keys)} }}"
 
     @property
     def geometry(self) -> placement.Shape:
@@ -92,6 +131,10 @@ class Shaped(base.Section):
         for key in self.vectors:
             vector = getattr(self, key)
             if vector is not None and len(vector) != dimension:
-                text = f"= {vector}: expected {dimension} components in {dimension}-D"
+                example = (vector * 3 if vector else [0.0] * 3)[:dimension]
+                text = (
+                    f"= {vector}: expected {dimension} components in {dimension}-D, {PER_AXIS}, "
+                    f"such as {key} = {json.dumps(example)}"
+                )
                 faults.append(Fault((key,), text))
         return faults

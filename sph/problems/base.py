@@ -127,7 +127,8 @@ class Problem(Section):
         description="number of particles; the lattice uses the nearest number that fits",
     )
     domain: list[float] | list[list[float]] = Field(
-        description="ends of the box: [lo, hi] for all axes, or a list with one [lo, hi] per axis"
+        description="ends of the box: [lo, hi] for all axes, or a list with one [lo, hi] per axis",
+        examples=[[0.0, 1.0]],
     )
     boundary: Boundary | list[Boundary] = Field(
         description='"periodic", "mirror" (reflecting wall) or "open" (vacuum outside) for all '
@@ -218,6 +219,11 @@ class Problem(Section):
         `sph.analysis.truth`, which checks where the exact solution is valid.
         """
         return None
+
+    @property
+    def has_exact(self) -> bool:
+        """Whether there is an `exact` of this problem, which may return None for some keys."""
+        return type(self).exact is not Problem.exact
 
     def departs(self, physics) -> str | None:
         """Return why the exact solution and the theory do not apply to [physics], or None.

@@ -45,7 +45,6 @@ NOT_RUN = {
     "sph stress": "runs for minutes; tests/unit/stress runs cases",
     "python scripts/benchmark.py": "measures for minutes",
     "python scripts/check_readers.py": "needs yt, pynbody and swiftsimio",
-    "python scripts/check_vtk.py": "needs pyvista",
     "python scripts/gravity.py": "measures for minutes",
     "python scripts/peers.py": "needs PySPH",
     "python scripts/peers_solids.py": "needs PySPH",

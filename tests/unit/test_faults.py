@@ -147,3 +147,22 @@ def test_coincident_particles_counted_with_images(messages, boundary, images):
     messages.check(error)
     alone = state(boundary=boundary, density=density)
     messages.check(faults.crowded(alone))
+
+
+@pytest.mark.parametrize(
+    ("high", "boundary", "words"),
+    [
+        (
+            1000.0,
+            "periodic",
+            "extend over 0.1 % of the domain along x, [0, 1000], which is periodic",
+        ),
+        (1000.0, "open", None),
+        (2.0, "periodic", None),
+    ],
+)
+def test_box_in_another_unit_than_positions_is_noted(high, boundary, words):
+    problem = SimpleNamespace(boundaries=(boundary,) * 2, box=np.array([[0.0, high]] * 2))
+    particles = SimpleNamespace(position=np.tile(np.linspace(0.0, 1.0, 9), (2, 1)), number=9)
+    note = faults.mostly_empty(SimpleNamespace(config=SimpleNamespace(problem=problem)), particles)
+    assert (note is None) if words is None else words in note

@@ -7,17 +7,22 @@ import re
 import subprocess
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 from click.testing import CliRunner
 
 from sph import config as configuration
 from sph import fingerprint
+from sph.analysis import trial
+from sph.analysis.info import settings
 from sph.cli import main
+from sph.clock import Clock
 from sph.config import copies, outside
 from sph.errors import ConfigError, DeclarationError, FileError
 from sph.output import checkpoint as checkpoints
 from sph.scene import Scene
+from sph.simulation import Simulation
 
 ROOT = Path(__file__).parents[2]
 CLOUDS = (ROOT / "docs" / "notebooks" / "two_clouds.py").read_text()
@@ -69,6 +74,8 @@ def test_problem_file_gives_name_keys_defaults_and_diagnostics(home):
     assert found.problem.file_sha256 == digest_of(home / "clouds.py")
     assert (found.problem.n, found.problem.radius, found.problem.contrast) == (256, 0.2, 4.0)
     assert found.physics.gamma == 5.0 / 3.0
+    changed = [one["key"] for one in settings.different(found)]
+    assert changed == ["problem.n", "problem.radius", "time.end", "output.interval", "run.threads"]
     summary = json.loads((run(home) / "summary.json").read_text())
     assert summary["problem"] == "clouds"
     header, first = (home / "run" / "history.csv").read_text().splitlines()[:2]
@@ -112,6 +119,26 @@ def test_copy_of_configuration_finds_problem_file(home, tmp_path_factory, text):
     copy.write_text(copies.read_to_copy(home / "clouds.toml"))
     assert configuration.load(copy).problem.file == str(home / "clouds.py")
     assert ("# mine" in copy.read_text()) == ("# mine" in text)
+
+
+def test_copy_of_configuration_has_absolute_paths_that_problem_declares(home, tmp_path_factory):
+    text = (
+        CLOUDS
+        + """
+    paths: ClassVar = ("table",)
+    table: str = Field(default="", description="a file")
+    radii: str = Field(default="", description="no file")
+"""
+    )
+    (home / "clouds.py").write_text(text)
+    keys = 'file = "clouds.py"\ntable = "a.csv"\nradii = "a.csv"\n'
+    (home / "clouds.toml").write_text(f"[problem]\n{keys}")
+    copy = tmp_path_factory.mktemp("copy") / "base.toml"
+    copy.write_text(copies.read_to_copy(home / "clouds.toml"))
+    found = configuration.load(copy).problem
+    assert found.file == str(home / "clouds.py")
+    assert (found.table, found.radii) == (str(home / "a.csv"), "a.csv")
+    assert found.table == configuration.load(home / "clouds.toml").problem.table
 
 
 @pytest.mark.slow
@@ -323,27 +350,235 @@ def test_wrong_initial_state_is_refused(home, name):
         scene.initial_state()
 
 
-@pytest.mark.parametrize(
-    ("method", "value", "words"),
-    [
-        ("diagnostics", "[1.0]", "expected a dictionary of numbers by name"),
-        ("diagnostics", '{"a": particles.mass}', "diagnostics returned a = a ndarray; expected a"),
-        ("diagnostics", "particles.masses", "in diagnostics: AttributeError: "),
-        ("exact", '{"density": 1.0}', "expected a dictionary of density, velocity, pressure, "),
-        ("exact", '{"density": 1.0}', "a dictionary without velocity, pressure, internal_energy;"),
-        ("exact", "1.0", "exact returned 1.0; expected a dictionary"),
-        ("report", "1.0", "report returned 1.0; expected a dictionary"),
-    ],
+# --- methods that a run calls only at its end, tried before the first step ---------------------
+
+ARGUMENTS = {
+    "diagnostics": "particles",
+    "exact": "eos, time, position",
+    "exact_ends": "eos",
+    "undisturbed": "eos, time",
+    "error_region": "eos, time, position",
+    "departs": "physics",
+    "remarks": "",
+    "theory": "eos, times",
+    "over_time": "eos, history",
+}
+FOUR = (
+    '"density": position[0], "velocity": position, "pressure": {}, "internal_energy": position[0]'
 )
-def test_wrong_result_of_method_is_refused(home, method, value, words):
-    arguments = {"diagnostics": "particles", "exact": "eos, time, position"}
+LATE = [
+    ("diagnostics", "[1.0]", "expected a dictionary of numbers by name"),
+    ("diagnostics", '{"a": particles.mass}', "diagnostics returned a = a ndarray; expected a"),
+    ("diagnostics", "particles.masses", "in diagnostics: AttributeError: "),
+    ("exact", '{"density": 1.0}', "expected a dictionary of density, velocity, pressure, "),
+    ("exact", '{"density": 1.0}', "a dictionary without velocity, pressure, internal_energy;"),
+    ("exact", "1.0", "exact returned 1.0; expected a dictionary"),
+    ("exact", f"{{{FOUR.format(1.0)}}}", "pressure of the shape (); expected (N,) = (3,)"),
+    ("exact", f"{{{FOUR.format('np.ones(self.n)')}}}", "pressure of the shape (256,); expected"),
+    ("exact", "{}[time]", "in exact: KeyError: 0.0 (t = 0, 3 points)\n    return {}[time]"),
+    (
+        "exact",
+        "None if time == 0 else 1 / 0",
+        "in exact: ZeroDivisionError: division by zero (t = 0.02, ",
+    ),
+    ("exact_ends", "0.5", "exact_ends returned 0.5; expected a time and a text"),
+    ("undisturbed", "[0.0, 1.0]", "undisturbed returned an array of the shape (2,); expected (D, "),
+    ("error_region", "position[0] > 0", "expected a mask of the shape (N,) = (3,) and a text"),
+    ("error_region", "(position > 0, '')", "expected a mask of the shape (N,) = (3,) and a text"),
+    ("remarks", "'two clouds'", "remarks returned 'two clouds'; expected a list of texts"),
+    ("departs", "True", "departs returned True; expected a text"),
+    ("theory", "{'t': 1.0}", "theory returned t of the shape (); expected numbers of the shape"),
+    ("report", "1.0", "report returned 1.0; expected a dictionary"),
+    ("report", "particles[2].positions", "in report: AttributeError: "),
+    ("compare", "particles[2].position[2, 0]", "in compare: IndexError: index 2 is out of bounds"),
+    ("compare", "self.compared", "in compare: AttributeError: "),
+    ("over_time", "history['kinetic']", "in over_time: KeyError: 'kinetic'"),
+    ("diagnostics", "particles.velocity.fill(0) or {}", "ValueError: assignment destination is re"),
+    ("report", "particles[2].density.fill(1) or {}", "ValueError: assignment destination is read-"),
+    ("diagnostics", "{'a,b': 1.0}", "the name 'a,b'; expected a name without commas"),
+    ("diagnostics", "setattr(self, 'n', 3)", "self.n is set: keys of a problem do not change. Tr"),
+]
+
+
+def with_method(home, method, value):
+    """Let the problem's `method` return `value`, and return the line where it does."""
     text = CLOUDS.replace("def diagnostics", "def _no_diagnostics")
-    text += f"\n    def {method}(self, {arguments.get(method, '*particles')}):\n"
-    (home / "clouds.py").write_text(f"{text}        return {value}\n")
+    text += f"\n    def {method}(self, {ARGUMENTS.get(method, '*particles')}):\n"
+    text += f"        return {value}\n"
+    (home / "clouds.py").write_text(text)
+    return text.count("\n")
+
+
+@pytest.mark.parametrize(("method", "value", "words"), LATE)
+def test_fault_of_late_method_is_found_before_first_step(home, method, value, words, monkeypatch):
+    last = with_method(home, method, value)
+    monkeypatch.setattr(Simulation, "proceed", lambda *_: pytest.fail("a step was taken"))
     done = sph_("run", home / "clouds.toml", "-o", home / "run")
     assert done.exit_code == 2, done.output
     assert words in done.stderr
+    line = last if f", in {method}: " in done.stderr else last - 1
+    assert f"{home / 'clouds.py'}, line {line}" in done.stderr
     assert "Traceback" not in done.stderr
+
+
+@pytest.mark.parametrize(
+    ("method", "value"),
+    [
+        ("report", "{'last': np.flatnonzero(particles[2].density > 100)[-1]}"),
+        ("compare", "{'last': particles[2].density[particles[2].density > 100].max()}"),
+        ("over_time", "{'rate': 1.0 / int(np.ptp(history['kinetic_energy']))}"),
+    ],
+)
+def test_method_that_fails_only_with_initial_values_is_noted(home, method, value):
+    """A maximum over the particles that a shock has passed, a fit: not before the first step."""
+    with_method(home, method, value)
+    simulation = Simulation.start(Scene(configuration.load(home / "clouds.toml")), 1, Clock())
+    (note,) = trial.notes(simulation)
+    assert f"in a trial call with the initial state, {home / 'clouds.py'}, line " in note
+    assert f"in {method}: " in note
+
+
+def test_class_of_another_name_is_named(home):
+    edited(home, "class Problem(", "class Clouds(")
+    with pytest.raises(ConfigError, match="expected a class Problem, but it has Clouds"):
+        configuration.load(home / "clouds.toml")
+
+
+def test_negative_initial_energy_is_refused_with_remedy(home):
+    edited(home, "eos.internal_energy(density, 1.0)", "eos.internal_energy(density, -1.0)")
+    done = sph_("run", home / "clouds.toml", "-o", home / "run")
+    assert (done.exit_code, "are not negative" in done.stderr) == (3, True), done.output
+
+
+def test_wrong_arguments_are_refused_with_expected_ones(home):
+    (home / "clouds.py").write_text(f"{CLOUDS}\n    def exact(self, position):\n        pass\n")
+    with pytest.raises(ConfigError, match=r"exact has the arguments \(self, position\); expected "):
+        configuration.load(home / "clouds.toml")
+
+
+@pytest.mark.parametrize(
+    ("line", "words"),
+    [
+        ("profiles: ClassVar = ('density', 'Mach')", "expected four of density, internal_energy, "),
+        ("limits: ClassVar = {'energy_drift': 1e-3}", "limits has 'energy_drift': 0.001; expected"),
+        ("quantities: ClassVar = {'a': 'length'}", "quantities has 'a': 'length'; expected"),
+    ],
+)
+def test_wrong_class_attribute_is_refused(home, line, words):
+    (home / "clouds.py").write_text(f"{CLOUDS}\n    {line}\n")
+    with pytest.raises(ConfigError, match=re.escape(words)):
+        configuration.load(home / "clouds.toml")
+
+
+def test_problem_of_package_sph_is_not_tried(monkeypatch):
+    found = configuration.load(ROOT / "configs" / "sod.toml", ["problem.n=100"])
+    simulation = SimpleNamespace(scene=Scene(found), particles=None)
+    monkeypatch.setattr(type(found.problem), "exact", lambda *_: pytest.fail("exact was called"))
+    assert list(trial.notes(simulation)) == []
+
+
+@pytest.mark.parametrize(
+    ("value", "words"),
+    [
+        ("{'t': 1.0}", "diagnostics returned t, which the history has already"),
+        ("{f'a{len(self.model_dump.cache)}': 1.0}", "in some steps only; expected the names of"),
+    ],
+)
+def test_wrong_names_of_diagnostics_are_refused(home, value, words):
+    with_method(home, "diagnostics", value.replace("len(self.model_dump.cache)", "count()"))
+    text = (home / "clouds.py").read_text()
+    calls = "import itertools\n_calls = itertools.count()\n"
+    # another name from the first step on: the trial and the header of the history call before
+    counted = f"{calls}\n\ndef count():\n    return max(0, next(_calls) - 2)\n\n\nclass Problem"
+    (home / "clouds.py").write_text(text.replace("class Problem", counted))
+    done = sph_("run", home / "clouds.toml", "-o", home / "run")
+    assert (done.exit_code, words in done.stderr) == (2, True), done.output
+
+
+# --- runs that fail before their first checkpoint, or at their end -----------------------------
+
+
+def test_run_that_fails_before_first_step_leaves_no_directory(home):
+    with_method(home, "report", "1.0")
+    for into in ("run", "new/below/run"):
+        assert sph_("run", home / "clouds.toml", "-o", home / into).exit_code == 2
+    edited(home, "        low, high = self.domain\n        side", "        1 / 0\n        side")
+    assert sph_("run", home / "clouds.toml", "-o", home / "run").exit_code == 2
+    assert sorted(one.name for one in home.iterdir()) == ["clouds.py", "clouds.toml"]
+
+
+def test_forced_run_without_initial_state_keeps_earlier_run(home):
+    before = sorted(run(home).rglob("*"))
+    edited(home, "        low, high = self.domain\n        side", "        1 / 0\n        side")
+    assert sph_("run", home / "clouds.toml", "-o", home / "run", "--force").exit_code == 2
+    assert sorted((home / "run").rglob("*")) == before
+
+
+def test_directory_of_user_stays_when_run_fails(home):
+    with_method(home, "report", "1.0")
+    (home / "run").mkdir()
+    assert sph_("run", home / "clouds.toml", "-o", home / "run").exit_code == 2
+    assert list((home / "run").iterdir()) == []
+
+
+def test_fault_at_end_says_how_to_complete_run(home):
+    with_method(home, "report", "{'a': 1 / int(eos is None or args[0] < 0.02)}")
+    edited(home, "self, *particles)", "self, eos, *args)")
+    (home / "clouds.toml").write_text(CONFIG.replace("end = 0.02", "end = 0.01"))
+    done = sph_("run", home / "clouds.toml", "-o", home / "run", "--set", "time.end=0.02")
+    assert (done.exit_code, "in a trial call" in done.stderr) == (2, True), done.output
+    assert f"`sph restart {home / 'run'}` writes the summary" in done.stderr
+    edited(home, "1 / int(eos is None or args[0] < 0.02)", "1.0")
+    done = sph_("restart", home / "run")
+    assert done.exit_code == 0, done.output
+    assert json.loads((home / "run" / "summary.json").read_text())["report"] == {"a": 1.0}
+
+
+def test_restart_tries_changed_file_before_anything_changes(home):
+    run(home)
+    edited(
+        home, "    def diagnostics", "    def exact(*_):\n        return 1.0\n\n    def diagnostics"
+    )
+    middle = home / "run" / "checkpoints" / "checkpoint_000001.h5"
+    before = sorted((home / "run").rglob("*"))
+    for options in ([], ["-o", home / "again"]):
+        done = sph_("restart", middle, *options)
+        assert (done.exit_code, "exact returned 1.0" in done.stderr) == (2, True), done.output
+    assert sorted((home / "run").rglob("*")) == before
+    assert not (home / "again").exists()
+
+
+def test_restart_with_other_diagnostics_says_that_file_has_changed(home, messages):
+    run(home)
+    edited(home, '"kinetic_energy_x"', '"energy_x"')
+    done = sph_("restart", home / "run" / "checkpoints" / "checkpoint_000001.h5")
+    assert done.exit_code == FileError.exit_code
+    messages.check(done.stderr)
+
+
+# --- in Python -------------------------------------------------------------------------------
+
+SCRIPT = """\
+import sph
+sph.run("clouds.toml", output="run")
+"""
+
+
+@pytest.mark.parametrize("body", ["1 / 0", "np.zeros(3) + np.zeros(4)", "return 1.0"])
+def test_traceback_in_python_is_short_and_shows_users_code_only(home, body):
+    edited(home, "        low, high = self.domain\n        side", f"        {body}\n        side")
+    (home / "script.py").write_text(SCRIPT)
+    environment = os.environ | {"PYTHONPATH": str(ROOT)}
+    done = subprocess.run([sys.executable, "script.py"], cwd=home, env=environment,
+                          capture_output=True, text=True, timeout=200)  # fmt: skip
+    frames = re.findall(r'  File "(.*)", line', done.stderr)
+    ours = [one for one in frames if one.startswith(str(ROOT))]
+    assert [Path(one).name for one in ours] == ["concise.py"], done.stderr
+    theirs = [Path(one).name for one in frames if one not in ours]
+    assert theirs == (["script.py"] if "return" in body else ["clouds.py", "script.py"])
+    last = done.stderr.strip().splitlines()
+    assert f"sph.errors.DeclarationError: {home / 'clouds.py'}, line " in done.stderr
+    assert last[-1] == f"    {body}" or "expected sph.problems.base.InitialState" in last[-1]
 
 
 # --- problems of other packages ---------------------------------------------------------------

@@ -14,6 +14,7 @@ from sph import config as configuration
 from sph import restarting
 from sph.cli import main
 from sph.output import checkpoint as checkpoints
+from sph.output.history import History
 from sph.output.run_directory import RunDirectory
 from sph.simulation import Simulation
 
@@ -208,7 +209,7 @@ def test_killed_restart_has_recorded_settings(run, tmp_path, monkeypatch, killed
     def kill(*_, **__):
         raise KeyboardInterrupt
 
-    owner = RunDirectory if killed_in == "write_config" else Simulation
+    owner = {"write_config": RunDirectory, "resume": History, "advance": Simulation}[killed_in]
     with monkeypatch.context() as patch:
         patch.setattr(owner, killed_in, kill)
         assert sph_("restart", run.path, *SETTINGS).exit_code != 0

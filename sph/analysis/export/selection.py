@@ -5,7 +5,7 @@ from pathlib import Path
 
 from sph.errors import ConfigError, FileError
 from sph.output import checkpoint as checkpoints
-from sph.output.run_directory import RunDirectory, find
+from sph.output.run_directory import AGAIN, RunDirectory, find
 
 EXPORT = "export"
 
@@ -28,7 +28,7 @@ def choose(source: Path, times: Sequence[float], every: bool) -> tuple[list[Path
     run = RunDirectory.open(source)
     known = run.checkpoints()
     if not known:
-        raise FileError(f"{source} has no checkpoints, so there is nothing to export.")
+        raise FileError(f"{source} has no checkpoints, so there is nothing to export.{AGAIN}")
     if every:
         return known, run.path / EXPORT
     if not times:

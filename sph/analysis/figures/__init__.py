@@ -85,7 +85,7 @@ def _draw_view(source: Source, target: Path | None, view: View, times: Sequence[
     if states[-1].dimension == 1 and view == View():
         picture, name = profiles.over_time(states), "profiles_at_times"
     else:
-        picture, name = figure(states, view), view.name_of(maps.main_field(states[-1]))
+        picture, name = figure(states, view), view.name_of(maps.main_field(*states))
     directory = source.path.parent if source.run is None else source.run.figures
     return _save(picture, Path(target or directory / f"{name}.png"))
 
@@ -99,7 +99,10 @@ def _pictures(source: Source, run: RunDirectory):
     if last.dimension > 1:
         yield "slice" if last.dimension == 3 else "map", maps.single(last)
     in_profiles = last.dimension == 1 or last.is_radial
-    yield "evolution", (profiles if in_profiles else maps).over_time(states)
+    if in_profiles:
+        yield "evolution", profiles.over_time(states)
+    else:  # strain stays, so that the last state has most of it
+        yield "evolution", maps.over_time(states, maps.main_field(last))
     if run.history.exists():
         steps = read_history(run.history)
         if steps["t"].size:

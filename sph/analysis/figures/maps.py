@@ -40,41 +40,45 @@ def single(state: State) -> Figure:
     return figure
 
 
-def over_time(states: Iterable[State]) -> Figure:
-    """The main field of one run at several times, in one scale of colours and one frame.
+def over_time(states: Iterable[State], field: str) -> Figure:
+    """A field of one run at several times, in one scale of colours and one frame.
 
     `states` is iterated twice, so that few are in memory: the frame holds the gas of all times.
     """
     plane = common_plane(states, PIXELS_OF_MANY)
-    return side_by_side([drawn(state, plane, state.when, state.title) for state in states])
+    return side_by_side([drawn(state, plane, state.when, state.title, field) for state in states])
 
 
-def compared(states: Iterable[State], labels: Sequence[str]) -> Figure:
+def compared(states: Sequence[State], labels: Sequence[str]) -> Figure:
     """The main field of several runs, in one scale of colours."""
+    field = main_field(*states)
     images = [
         drawn(
             state, plane_of(state, PIXELS_OF_MANY), f"{style.plain(label)}, {state.when}",
-            state.name,
+            state.name, field,
         )
         for state, label in zip(states, labels, strict=True)
     ]  # fmt: skip
     return side_by_side(images)
 
 
-def main_field(state: State) -> str:
-    """Density; plastic strain or, without yielding, von Mises stress of a solid.
+def main_field(*states: State) -> str:
+    """The field of maps of these states: density; of solids, whose density changes little, others.
 
-    The density of a solid changes little.
+    Plastic strain if all solids may yield and one has yielded, otherwise von Mises stress.
     """
-    if not state.is_solid:
+    if not all(state.is_solid for state in states):
         return "density"
-    return "von_mises" if state.particles.get("plastic_strain") is None else "plastic_strain"
+    strains = [state.particles.get("plastic_strain") for state in states]
+    has_yielded = any(strain is not None and strain.any() for strain in strains)
+    may_yield = all(strain is not None for strain in strains)
+    return "plastic_strain" if may_yield and has_yielded else "von_mises"
 
 
 def second_field(state: State) -> str:
     """Pressure where it varies by more than a factor 2; nearer to balance, speed tells more.
 
-    Of a solid that yields von Mises stress, otherwise pressure.
+    Of a solid that has yielded von Mises stress, otherwise pressure.
     """
     if state.is_solid:
         return "pressure" if main_field(state) == "von_mises" else "von_mises"

@@ -56,6 +56,7 @@ def _pictures(states: States, view: View, last: State) -> Callable[[State], Figu
         axes = profile_axes.of_movie(states)
         return lambda state: profiles.frame(state, axes)
     view.check(last)
+    view = view._replace(field=view.field or maps.main_field(last))  # one for all frames
     plane = view.plane(states, maps.PIXELS)
     scale = _scale(states, view, plane)
 

@@ -13,7 +13,7 @@ from sph.config import Config
 from sph.domain import Domain
 from sph.errors import FileError
 from sph.output import checkpoint, frames, same_run
-from sph.output.run_directory import RunDirectory, find
+from sph.output.run_directory import AGAIN, RunDirectory, find
 from sph.problems.support import centred, uniaxial
 from sph.quantity import FIELDS
 
@@ -123,7 +123,7 @@ def find_source(path: Path) -> Source:
         run = RunDirectory.open(path)
         found = tuple(run.checkpoints())
         if not found:
-            raise FileError(f"{path} has no checkpoints, so there is nothing to draw.")
+            raise FileError(f"{path} has no checkpoints, so there is nothing to draw.{AGAIN}")
         return Source(path, run, found)
     home, path = find(path)
     return Source(path, home, (path,))

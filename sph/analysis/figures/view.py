@@ -118,7 +118,8 @@ def figure(states, view: View) -> Figure:
     for state in states:
         view.check(state)
     plane = view.plane(states, maps.PIXELS if len(states) == 1 else maps.PIXELS_OF_MANY)
-    drawn = [maps.drawn(state, plane, state.when, state.title, view.field) for state in states]
+    field = view.field or maps.main_field(*states)
+    drawn = [maps.drawn(state, plane, state.when, state.title, field) for state in states]
     values = np.concatenate([one.values.ravel() for one in drawn])
     if view.limits or view.is_log:
         scale = view.scale(float(np.nanmin(values)), float(np.nanmax(values)))

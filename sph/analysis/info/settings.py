@@ -6,10 +6,13 @@ from typing import Any
 from pydantic import BaseModel
 
 from sph import config as configuration
-from sph.config import Config, restarts
+from sph.config import Config, outside, restarts
 from sph.config.toml_text import value_text
 from sph.errors import SphError
 from sph.problems.base import Section
+
+# What names a problem, and where it was found.
+NOT_SETTINGS = {"problem.name", *(f"problem.{key}" for key in outside.SOURCES)}
 
 
 def different(config: Config) -> list[dict[str, Any]]:
@@ -50,7 +53,7 @@ def _by_key(config: Config) -> list[dict[str, Any]]:
         for key, field in type(table).model_fields.items():
             default = None if field.is_required() else field.get_default(call_default_factory=True)
             default = _plain(own.get(f"{name}.{key}", default))
-            if values[key] != default and f"{name}.{key}" != "problem.name":
+            if values[key] != default and f"{name}.{key}" not in NOT_SETTINGS:
                 found.append(_setting(f"{name}.{key}", values[key], default))
     return found
 

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from sph.analysis.report import runs, table, words
-from sph.analysis.report.compare import COSTS, Question, Report, Series, compare
+from sph.analysis.report.compare import COSTS, DRIFT, Question, Report, Series, compare
 from sph.errors import ConfigError
 from sph.output.files import explained, refuse_link, write_text
 
@@ -20,6 +20,9 @@ def make(sources: Sequence[Path], question: Question) -> Report:
     rows = runs.read(sources)
     if question.reference is not None:
         rows = _against(question.reference, rows)
+    if not question.field:
+        has_errors = any("density" in row.figures() for row in rows)
+        question = question._replace(field="density" if has_errors else DRIFT)
     _check(rows, question)
     return compare(rows, question)
 

@@ -25,10 +25,16 @@ COSTS = {
 LEAST_GROWTH = 0.9
 
 
+# What runs without an exact solution are compared by.
+DRIFT = "conservation.energy_drift_max"
+
+
 class Question(NamedTuple):
     """What a report compares."""
 
-    field: str = "density"  # of the errors, or table.name of a figure of the summary
+    # of the errors, or table.name of a figure of the summary; empty: density, or DRIFT if no run
+    # has errors
+    field: str = ""
     norm: str = "L1"
     cost: str = "cpu"  # a key of COSTS
     by: tuple[str, ...] = ()  # keys that distinguish lines; empty: all that vary but N

@@ -115,6 +115,7 @@ def read(sources: Sequence[Path]) -> list[Row]:
                 row.sweep = source.resolve().name
         elif not paths:
             there = "holds no runs" if source.is_dir() else "does not exist"
+            there = "is a file" if source.is_file() else there
             raise FileError(f"{source} {there}.\nTry: a run directory, or one that holds some.")
         rows |= mine
     found = list(rows.values())

@@ -15,7 +15,7 @@ from sph.parts.external import Field
 class Uniform(NamedTuple):
     """`g`: acceleration (D,), one number per axis."""
 
-    g: Annotated[list[float], Parameter("acceleration, one number per axis")]
+    g: Annotated[list[float], Parameter("acceleration, one number per axis", example=[0.0, -9.81])]
 
     def acceleration(self, position):
         return np.broadcast_to(np.array(self.g)[:, None], position.shape)

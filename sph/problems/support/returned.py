@@ -66,8 +66,56 @@ def _fault_of_exact(problem, found: Any, eos, time: float, position: np.ndarray)
         without = ", ".join(name for name in EXACT if name in missing)
         words = f"a dictionary without {without}" if without else _words(found)
         return f"{words}; expected a dictionary of {', '.join(EXACT)}"
-    arrays = {name: np.nan_to_num(np.asarray(found[name])) for name in EXACT}  # NaN: not known
-    return fault_of_arrays(arrays, EXACT, problem.dimension, np.shape(position)[-1])
+    shapes = EXACT | ({"stress": "N"} if "stress" in found else {})
+    arrays = {name: np.asarray(found[name]) for name in shapes}
+    known = {  # NaN: not known
+        name: np.nan_to_num(one) if one.dtype.kind == "f" else one for name, one in arrays.items()
+    }
+    fault = fault_of_arrays(known, shapes, problem.dimension, np.shape(position)[-1])
+    return fault and f"{fault}; position has the shape {np.shape(position)}"
+
+
+def _fault_of_ends(problem, found: Any, *_, **__) -> str:
+    if isinstance(found, tuple) and len(found) == 2:
+        time, reason = found
+        if isinstance(time, (int, float, np.number)) and isinstance(reason, str):
+            return ""
+    return f"{_words(found)}; expected a time and a text, such as (math.inf, '')"
+
+
+def _fault_of_range(problem, found: Any, *_, **__) -> str:
+    expected = (problem.dimension, 2)
+    if np.shape(found) == expected and np.asarray(found).dtype.kind in "fiu":
+        return ""
+    return (
+        f"an array of the shape {np.shape(found)}; expected (D, 2) = {expected}, the range of each "
+        "axis"
+    )
+
+
+def _fault_of_region(problem, found: Any, eos, time: float, position: np.ndarray) -> str:
+    number = np.shape(position)[-1]
+    if isinstance(found, tuple) and len(found) == 2:
+        mask, name = np.asarray(found[0]), found[1]
+        if mask.shape == (number,) and mask.dtype == bool and isinstance(name, str):
+            return ""
+    return f"{_words(found)}; expected a mask of the shape (N,) = ({number},) and a text"
+
+
+def _fault_of_theory(problem, found: Any, eos, times: np.ndarray) -> str:
+    if not isinstance(found, dict):
+        return f"{_words(found)}; expected a dictionary of arrays by column of the history"
+    for name, values in found.items():
+        if np.shape(values) != np.shape(times) or np.asarray(values).dtype.kind not in "fiu":
+            return (
+                f"{name} of the shape {np.shape(values)}; expected numbers of the shape (M,) = "
+                f"{np.shape(times)}, that of times"
+            )
+    return ""
+
+
+def _fault_of_reason(problem, found: Any, *_, **__) -> str:
+    return "" if found is None or isinstance(found, str) else f"{_words(found)}; expected a text"
 
 
 def _fault_of_numbers(problem, found: Any, *_, **__) -> str:
@@ -80,6 +128,19 @@ def _fault_of_numbers(problem, found: Any, *_, **__) -> str:
     return ""
 
 
+def _fault_of_texts(problem, found: Any, *_, **__) -> str:
+    if isinstance(found, list) and all(isinstance(one, str) for one in found):
+        return ""
+    return f"{_words(found)}; expected a list of texts"
+
+
+def _fault_of_columns(problem, found: Any, *_, **__) -> str:
+    """Columns of the history, whose names are the first line of a CSV file."""
+    fault = _fault_of_numbers(problem, found)
+    wrong = [] if fault else [name for name in found if not name or set(name) & set(',"\n\r')]
+    return fault or (f"the name {wrong[0]!r}; expected a name without commas" if wrong else "")
+
+
 def _words(value: Any) -> str:
     text = repr(value)
     return text if len(text) < 60 else f"a {type(value).__name__}"
@@ -88,7 +149,13 @@ def _words(value: Any) -> str:
 CHECKS: dict[str, Callable[..., str]] = {
     "initial": fault_of_state,
     "exact": _fault_of_exact,
-    "diagnostics": _fault_of_numbers,
+    "exact_ends": _fault_of_ends,
+    "undisturbed": _fault_of_range,
+    "error_region": _fault_of_region,
+    "departs": _fault_of_reason,
+    "remarks": _fault_of_texts,
+    "theory": _fault_of_theory,
+    "diagnostics": _fault_of_columns,
     "report": _fault_of_numbers,
     "compare": _fault_of_numbers,
     "over_time": _fault_of_numbers,

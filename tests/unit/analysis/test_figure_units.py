@@ -34,7 +34,7 @@ def test_maps_have_units_of_fields_axes_and_time():
     assert single.axes[0].get_title().endswith(DENSITY)
     assert single.axes[0].get_ylabel() == f"$y$ {LENGTH}"
     assert single.get_suptitle().endswith("$t$ = 0.5 Myr")
-    several = maps.over_time(states)
+    several = maps.over_time(states, "density")
     assert several.axes[-1].get_ylabel() == rf"density $\rho$ {DENSITY}"
     assert several.axes[0].get_ylabel() == f"$y$ {LENGTH}"
 

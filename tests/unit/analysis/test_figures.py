@@ -462,14 +462,35 @@ def solid_state(yields=True) -> State:
     ("yields", "fields"), [(True, ["plastic strain", "von Mises"]), (False, ["von Mises", "press"])]
 )
 def test_map_of_solid_shows_strain_or_stress(yields, fields):
-    panels = maps.single(solid_state(yields)).axes[:2]
+    state = solid_state(yields)
+    if yields:
+        state.particles.plastic_strain[0] = 1e-3
+    panels = maps.single(state).axes[:2]
     for panel, field in zip(panels, fields, strict=True):
         assert panel.get_title().startswith(field)
 
 
+def test_maps_of_solid_that_has_not_yielded_show_stress():
+    states = [solid_state(yields=True) for _ in range(2)]
+    assert maps.main_field(*states) == "von_mises"
+    assert maps.second_field(states[0]) == "pressure"
+    states[1].particles.plastic_strain[-1] = 1e-3
+    assert maps.main_field(*states) == "plastic_strain"  # of all, in one scale of colours
+    assert maps.main_field(states[1], solid_state(yields=False)) == "von_mises"  # which both have
+
+
+@pytest.mark.parametrize(("end", "field"), [(0.0, "von Mises"), (1e-3, "plastic strain")])
+def test_maps_at_several_times_show_one_field(end, field):
+    states = [solid_state(yields=True) for _ in range(2)]
+    states[1].particles.plastic_strain[:] = end
+    pictures = [maps.compared(states, ["a", "b"]), figure(states, View())]
+    for picture in pictures:
+        assert picture.axes[-1].get_ylabel().startswith(field)
+
+
 def test_map_of_solid_ends_at_its_surface_and_outlines_bodies():
     state = solid_state()
-    panel = maps.single(state).axes[1]
+    panel = maps.single(state).axes[0]
     shown = panel.images[0].get_array()
     # S_zz = -0.2: the sum of squares is 0.14
     assert shown.compressed() == pytest.approx(np.full(shown.count(), np.sqrt(0.21)))
@@ -496,7 +517,7 @@ def test_equivalent_stress_has_all_normal_stresses(stress, expected):
 def test_maps_over_time_share_colour_scale():
     states = [state_of("kelvin_helmholtz", time=t) for t in (0.0, 0.1, 0.2)]
     states[1].particles.density[:] *= 2.0
-    images = [panel.images[0] for panel in maps.over_time(states).axes if panel.images]
+    images = [panel.images[0] for panel in maps.over_time(states, "density").axes if panel.images]
     assert len(images) == 3
     limits = {(image.norm.vmin, image.norm.vmax) for image in images}
     assert limits == {
@@ -525,7 +546,11 @@ def test_map_open_domain_includes_gas_outside():
 def test_evolution_in_one_frame_of_all_times():
     states = [state_of("expanding_ball", time=0.0) for _ in range(2)]
     states[1].particles.position[0] *= 2.0
-    drawn = [panel.images[0].get_extent() for panel in maps.over_time(states).axes if panel.images]
+    drawn = [
+        panel.images[0].get_extent()
+        for panel in maps.over_time(states, "density").axes
+        if panel.images
+    ]
     assert drawn[0] == drawn[1]
     own = [maps.plane_of(state, 16) for state in states]
     assert own[1].high[0] > own[0].high[0]

@@ -104,6 +104,14 @@ def write_run(path, error, cpu, overrides=(), status="done", **changes):
     return run.path
 
 
+def test_runs_without_exact_solution_are_compared_by_energy_drift(tmp_path):
+    for n in (100, 200):
+        write_run(tmp_path / f"n={n}", None, 1.0, [f"problem.n={n}"])
+    assert compared(tmp_path).error.tolist() == [2e-5, 2e-5]
+    write_run(tmp_path / "n=400", 0.25, 1.0, ["problem.n=400"])
+    assert compared(tmp_path).error.tolist() == [0.25]  # where a run has errors, these
+
+
 @pytest.fixture
 def study(tmp_path):
     """Error = 100/N and CPU = (N/100)^2 for alpha = 1; thrice the time for alpha = 2."""

@@ -56,7 +56,7 @@ def test_create_over_failed_run_without_checkpoint_needs_no_force(messages, fini
     with messages.raised(FileError, "--force"):  # its history would be lost
         RunDirectory.create(finished.path)
     finished.history.unlink(missing_ok=True)
-    RunDirectory.create(finished.path)
+    RunDirectory.create(finished.path).make_room()
     assert tree(finished.path) == {"config.toml"}
 
 
@@ -68,7 +68,7 @@ def test_create_over_killed_run_without_checkpoint_needs_no_force(messages, run,
     if has_ended:
         run.write_summary({})
     if rows < 2 and not has_ended:
-        RunDirectory.create(run.path)
+        RunDirectory.create(run.path).make_room()
         assert tree(run.path) == {"config.toml"}
     else:
         with messages.raised(FileError, "--force"):
@@ -131,17 +131,17 @@ def test_force_removes_run_and_keeps_user_files(finished):
     for name in theirs:
         (finished.path / name).touch()
     (finished.path / ".history.csv.partial").touch()
-    RunDirectory.create(finished.path, force=True)
+    RunDirectory.create(finished.path, force=True).make_room()
     assert tree(finished.path) == theirs | {"config.toml"}
     # and it is still known as a run, so that it can be forced again
-    RunDirectory.create(finished.path, force=True)
+    RunDirectory.create(finished.path, force=True).make_room()
 
 
 def test_force_keeps_linked_figures_directory(finished, tmp_path):
     elsewhere = tmp_path / "elsewhere"
     finished.figures.rename(elsewhere)
     finished.figures.symlink_to(elsewhere)
-    RunDirectory.create(finished.path, force=True)
+    RunDirectory.create(finished.path, force=True).make_room()
     assert (elsewhere / "file").exists()
 
 

@@ -188,6 +188,7 @@ def test_restart_keeps_how_relaxation_ended(glass_run, tmp_path):
     again, _ = restarting.restart(first, [], tmp_path / "again", Lines())
     assert again["relaxation"] == summary["relaxation"]
     overwritten = RunDirectory.create(tmp_path / "again", force=True)
+    overwritten.make_room()
     assert overwritten.read_relaxation() is None
 
 

@@ -2,10 +2,14 @@
 
 import numpy as np
 import pytest
+from click.testing import CliRunner
 
 from sph import config, kernels
+from sph.cli import main
 from sph.domain import Domain
 from sph.errors import ConfigError
+from sph.problems._region import Region
+from sph.problems._shapes import DIMENSION
 from sph.problems.support import areas, bodies, glass
 
 KERNEL = kernels.make("wendland_c2")
@@ -228,3 +232,67 @@ def test_regions_that_do_not_go_together_are_refused(messages):
         config.from_text(scene('shape = "everywhere"\npressure = 1.0'))
     with messages.raised(ConfigError, "problem.lattice"):
         config.from_text(scene(EVERYWHERE, keys='lattice = "bcc"'))
+
+
+AXES = "expected a list of numbers, one per axis, such as"
+
+
+@pytest.mark.parametrize(
+    ("region", "words"),
+    [
+        ('shape = "box"\nlow = 0.0\nhigh = [0.5, 1.0]', f"low = 0.0: {AXES} low = [0.0, 0.0]"),
+        ('shape = "box"\nlow = "0"\nhigh = [0.5, 1.0]', f'low = "0": {AXES} low = [0.0, 0.0]'),
+        ('shape = "box"\nlow = ["a", 0.0]\nhigh = [0.5, 1.0]', 'low[0] = "a": expected a number, '),
+        ('shape = "box"\nlow = [0.1]\nhigh = [0.5, 1.0]', "in 2-D, one per axis, such as "
+         "low = [0.1, 0.1]"),
+        ('shape = "box"\nrange = [0.0, 0.5]', 'such as { shape = "box", low = [0.0, 0.0], hi'),
+        ('shape = "slab"\naxis = "x"\nlow = 0.0\nhigh = 0.5', 'low is not a key of shape "slab": '),
+        ('shape = "slab"\naxis = "x"\nlow = 0.0\nhigh = 0.5', "range is missing: expected axis, "),
+        ('shape = "slab"\naxis = "x"\nrange = 0.5', "a list of 2 numbers, such as range = "),
+        ('shape = "slab"\naxis = 0\nrange = [0.0, 0.5]', 'axis = 0: expected "x", "y" or "z", '),
+        ('shape = "disc"\ncentre = 0.5\nradius = 0.1', f"{AXES} centre = [0.5, 0.5]"),
+        ('shape = "disc"\ncentre = [0.5, 0.5]\nradius = [0.1]', "than 0, such as radius = 0.2"),
+        ('shape = "disc"\ncenter = [0.5, 0.5]\nradius = 0.1', "did you mean centre?"),
+        ('shape = "ring"\ncentre = [0.5, 0.5]\ninner = "1"\nouter = 2', "such as inner = 0.1"),
+        ('shape = "half_plane"\npoint = 0.5\nnormal = [1.0, 0.0]', f"{AXES} point = [0.5, 0.5]"),
+        ('shape = "half_plane"\npoint = [0.5, 0.5]\nnormal = "x"', f"{AXES} normal = [1.0, 0.0]"),
+        (f"{EVERYWHERE}\nvelocity = 1.0", 'one per axis, such as velocity = ["-y", 0.5]'),
+        ('shape = "everywhere"\ndensity = [1.0]', 'such as density = "1 + 0.1*sin(2*pi*x)"'),
+    ],
+)  # fmt: skip
+def test_key_of_wrong_kind_is_refused_with_example(region, words):
+    with pytest.raises(ConfigError) as caught:
+        config.from_text(scene(EVERYWHERE, region))
+    assert "problem.region[1]." in str(caught.value)
+    assert words in str(caught.value)
+
+
+def test_examples_of_shapes_are_valid():
+    for shape, keys in Region.shapes.items():
+        example = Region._example(shape)
+        dimension = DIMENSION.get(shape, 2)
+        text = (
+            f'[problem]\nname = "regions"\ndimension = {dimension}\ndomain = [-1.0, 1.0]\nregion = '
+        )
+        first = '{ shape = "everywhere", density = 1.0, pressure = 1.0 }'
+        found = config.from_text(f"{text}[{first}, {example}]\n").problem.region[1]
+        assert all(getattr(found, key) is not None for key in keys)
+
+
+def test_one_table_in_place_of_list_is_refused_with_remedy(messages):
+    with messages.raised(ConfigError, "Try: [[problem.region]]"):
+        config.from_text(f'[problem]\nname = "regions"\n[problem.region]\n{EVERYWHERE}\n')
+
+
+def test_number_of_particles_written_as_real_is_refused_with_remedy():
+    with pytest.raises(ConfigError, match=r"n = 1000\.0: expected .*, such as n = 1000$"):
+        config.from_text('[problem]\nname = "regions"\nn = 1e3\n')
+
+
+def test_run_whose_relaxation_fails_leaves_no_directory(tmp_path):
+    (tmp_path / "a.toml").write_text(scene(EVERYWHERE))
+    arguments = ["run", tmp_path / "a.toml", "-o", tmp_path / "run", "--set",
+                 "problem.relax={ residual = 1e-9, iterations = 2 }"]  # fmt: skip
+    done = CliRunner().invoke(main, [str(one) for one in arguments])
+    assert (done.exit_code, "after 2 iterations" in done.stderr) == (2, True), done.output
+    assert [one.name for one in tmp_path.iterdir()] == ["a.toml"]

@@ -97,6 +97,7 @@ def test_relative_errors_limited_to_error_region(tmp_path):
     problem = SimpleNamespace(
         exact=lambda *_: {"density": np.array([1.0, 2.0, 4.0])},
         error_region=lambda *_: (np.array([True, True, False]), "but the last"),
+        has_exact=True,
         departs=lambda _: None,
         exact_ends=lambda _: (0.5, "it does"),
         undisturbed=lambda *_: np.array([[-np.inf, np.inf]]),
@@ -204,7 +205,7 @@ def test_figures_keep_sign_and_weigh_by_volume(tmp_path):
     problem = SimpleNamespace(
         exact=lambda *_: {"density": np.array([-1.0, 2.0])},
         error_region=lambda *_: (np.array([True, True]), "all"),
-        departs=lambda _: None, exact_ends=lambda _: (0.5, "it does"),
+        has_exact=True, departs=lambda _: None, exact_ends=lambda _: (0.5, "it does"),
         undisturbed=lambda *_: np.array([[-np.inf, np.inf]]),
     )  # fmt: skip
     physics = SimpleNamespace(eos_model=lambda: None)
