@@ -39,7 +39,7 @@ def test_flyer_plate_matches_hugoniot(run):
 
 
 def test_flyer_plate_conserves_energy(run):
-    # half of it was measured, in the first steps, in which the plates meet: in proportion to the step
+    # twice what was measured, in the first steps, in which the plates meet
     assert run("flyer_plate", "problem.n=200", "physics.C=0.15").energy_drift < 1e-4
 
 
