@@ -35,6 +35,9 @@ from sph.version import __version__
 # To be raised with every change of what the datasets of /Checkpoint mean.
 FORMAT_VERSION = 2
 
+# Fields of earlier versions, which no step needs any more.
+RETIRED = {"stress_rate"}
+
 NOT_PARTICLES = ("time", "step", "next_step", "list_position", "list_support", "list_skin")
 
 # Last in the lineage of a file that contains only some particles, which cannot be restarted.
@@ -273,6 +276,8 @@ def _checkpoint(path: Path, state: dict, config, texts: dict[str, str]) -> Check
         budget = Budget(injected, added, Baseline(*baseline))
     others = {name: state.pop(name) for name in NOT_PARTICLES}
     scene = Scene(config)
+    for name in RETIRED - {field.name for field in scene.fields}:
+        state.pop(name, None)
     _check_fields(path, state, scene, texts.get("fields"))
     found = Checkpoint(
         particles=State(scene.fields, state),

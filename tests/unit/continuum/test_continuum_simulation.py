@@ -25,12 +25,14 @@ from marks import slow_except
 from sph import config, restarting, runner, simulation
 from sph.clock import Clock
 from sph.domain import Domain
+from sph.formulations.continuum import fields as continuum_fields
 from sph.neighbours import order as ordering
 from sph.output import checkpoint
 from sph.output.run_directory import RunDirectory
 from sph.problems import base
 from sph.progress import suited
 from sph.scene import Scene
+from sph.state import Field
 
 # Of the sum of absolute terms: some hundred terms of a few operations, 1e-16 each.
 ROUND_OFF = 1e-13
@@ -285,3 +287,16 @@ def test_restart_continues_solids_bit_for_bit(tmp_path):
         for name, array in one.items():
             assert array.tobytes() == other[name].tobytes(), (start.name, name)
         assert expected.budget == found.budget
+
+
+def test_restart_of_a_checkpoint_with_a_field_of_earlier_versions(tmp_path, monkeypatch):
+    fields = continuum_fields.of
+    monkeypatch.setattr(
+        continuum_fields, "of", lambda scheme: (*fields(scheme), Field("stress_rate", rank=2))
+    )
+    old = RunDirectory.create(tmp_path / "old")
+    runner.run(config.from_text(IMPACT).override(["time.end=0.02"]), old, suited())
+    assert "stress_rate" in checkpoint.read(old.latest()).particles.arrays()
+    monkeypatch.undo()
+    assert "stress_rate" not in checkpoint.read(old.latest()).particles.arrays()
+    restarting.restart(old.path, ["time.end=0.03"], tmp_path / "new", suited())
