@@ -39,8 +39,8 @@ def test_flyer_plate_matches_hugoniot(run):
 
 
 def test_flyer_plate_conserves_energy(run):
-    # 1.1e-4 was measured, in the first steps, in which the plates meet: in proportion to the step
-    assert run("flyer_plate", "problem.n=200").energy_drift < 2e-4
+    # twice what was measured, in the first steps, in which the plates meet
+    assert run("flyer_plate", "problem.n=200", "physics.C=0.15").energy_drift < 1e-4
 
 
 def test_density_behind_shock_does_not_depend_on_time_step(run):
