@@ -151,7 +151,7 @@ def test_run_directory_has_documented_files(done):
     assert set(json.loads((run / "summary.json").read_text())) == {
         "status", "reason", "warnings", "version", "problem", "dimension", "particles", "time",
         "steps", "lineage", "settings_changed", "errors", "errors_left_out", "report",
-        "conservation", "nearest", "cost", "compiled_in",
+        "conservation", "momentum_along", "nearest", "cost", "compiled_in",
         "left_out",
     }  # fmt: skip
 
