@@ -1,10 +1,11 @@
 """The commands on results: `sph plot`, `sph movie`, `sph info` and `sph export`."""
 
+from contextlib import closing
 from pathlib import Path
 
 import click
 
-from sph import standard_streams
+from sph import progress, standard_streams
 from sph.errors import ConfigError
 
 MAP_FIELDS = ("density", "pressure", "internal_energy", "speed", "plastic_strain", "von_mises")
@@ -39,15 +40,19 @@ def map_options(command):
                      "centre of the problem."),
         click.option("--zoom", nargs=4, type=float, metavar="X0 X1 Y0 Y1",
                      help="Draw this part of the domain: ends of the horizontal and of the "
-                     "vertical axis. Default: all of it."),
+                     "vertical axis, cut to the domain. Default: all of it."),
+        click.option("--linear", "is_linear", is_flag=True,
+                     help="Use a linear scale of colours. Default: linear; logarithmic if the "
+                     "highest value is above 1000 times the lowest or 10 times the median. With "
+                     "--range, linear unless there is --log."),
         click.option("--log", "is_log", is_flag=True,
                      help="Use a logarithmic scale of colours, of four decades at most without "
                      "--range."),
         click.option("--range", "limits", nargs=2, type=float, metavar="LO HI",
                      help="Ends of the scale of colours. Default: those of the values."),
         click.option("--field", type=click.Choice(MAP_FIELDS),
-                     help="Quantity to draw. Default: density; of a solid plastic strain, or von "
-                     "Mises stress if nothing has yielded."),
+                     help="Quantity to draw; grey is where there is no matter. Default: density; "
+                     "of a solid plastic strain, or von Mises stress if nothing has yielded."),
     ):  # fmt: skip
         command = option(command)
     return command
@@ -60,8 +65,8 @@ def map_options(command):
               help="Write one picture to FILE. Default: several, in figures/.")  # fmt: skip
 @map_options
 @click.option("--time", "times", multiple=True, type=float, metavar="T",
-              help="Draw the checkpoint nearest to time T. May be repeated. "
-              "Default: the last.")  # fmt: skip
+              help="Draw the checkpoint or frame nearest to time T. May be repeated. "
+              "Default: the last checkpoint.")  # fmt: skip
 @click.option("--live", is_flag=True,
               help="Draw one run while it goes on, in a window or, without a display, "
               "in figures/live.png.")  # fmt: skip
@@ -70,7 +75,7 @@ def plot(sources, target, times, live, dpi, **options):
     """Draw profiles, maps, slices and the history of runs.
 
     RUN_OR_CHECKPOINT is a run directory or a checkpoint file. Options of maps
-    (--field, --range, --log, --zoom, --slice, --projection) and --time draw
+    (--field, --range, --log, --linear, --zoom, --slice, --projection) and --time draw
     one picture alone, such as figures/map_of_density.png.
 
     With --live, the picture of RUN is drawn again after each checkpoint and
@@ -88,7 +93,7 @@ def plot(sources, target, times, live, dpi, **options):
             raise ConfigError("--live draws one run, and its newest state: leave out --time.")
         click.echo(live_picture.watch(sources[0], chosen, target, dpi, click.echo))
         return
-    for path in figures.draw(sources, target, chosen, times, dpi):
+    for path in figures.draw(sources, target, chosen, times, dpi, standard_streams.note):
         click.echo(f"drew {path}")
 
 
@@ -111,7 +116,8 @@ def movie(source, target, fps, dpi, **options):
     from sph.analysis import figures
     from sph.analysis.figures import movie as movies
 
-    made = movies.make(source, target, figures.View(**options), fps, dpi)
+    with closing(progress.suited_to_pictures()) as shown:
+        made = movies.make(source, target, figures.View(**options), fps, dpi, shown)
     click.echo(f"drew {made}")
 
 

@@ -165,6 +165,38 @@ class IterationBar(Iterations):
         self._bar.close()
 
 
+class Pictures(Messages):
+    """Of pictures of a movie: a line every LINE_INTERVAL."""
+
+    def start(self, total: int):
+        """`total` pictures are to be drawn."""
+        self.total, self.done, self._last = total, 0, time.monotonic()
+
+    def drew(self):
+        """One more is drawn."""
+        self.done += 1
+        if time.monotonic() - self._last >= LINE_INTERVAL:
+            self._last = time.monotonic()
+            self.note(f"drew {self.done} of {self.total} pictures")
+
+
+class PictureBar(Pictures):
+    """Of pictures of a movie: a bar over the pictures."""
+
+    def start(self, total: int):
+        import tqdm
+
+        super().start(total)
+        self._bar = tqdm.tqdm(total=total, unit="pictures", bar_format=RunBar.FORMAT, leave=False)
+
+    def drew(self):
+        self._bar.update()
+
+    def close(self):
+        if hasattr(self, "_bar"):
+            self._bar.close()
+
+
 def suited() -> Lines:
     """Progress of one run: a bar on a terminal, lines elsewhere."""
     return Bar() if _is_watched() else Lines()
@@ -180,6 +212,11 @@ def suited_to_runs(what: str, total: int | None, done: int = 0) -> RunLines:
 def suited_to_iterations(what: str, most: int) -> Iterations:
     """Progress of an iteration, see `Iterations`: a bar on a terminal, lines elsewhere."""
     return IterationBar(what, most) if _is_watched() else Iterations(what, most)
+
+
+def suited_to_pictures() -> Pictures:
+    """Progress of a movie: a bar on a terminal, lines elsewhere."""
+    return PictureBar() if _is_watched() else Pictures()
 
 
 def _is_watched():

@@ -152,6 +152,27 @@ def test_lines_of_iterations_are_seconds_apart(clock, capsys):
     assert capsys.readouterr().err == "relaxing: iteration 4 of at most 200, residual 1.00e-03\n"
 
 
+def test_bar_of_pictures_shows_count(monkeypatch):
+    stream = io.StringIO()
+    monkeypatch.setattr(sys, "stderr", stream)
+    bar = progress.PictureBar()
+    bar.start(4)
+    bar.drew()
+    bar._bar.refresh()
+    bar.close()
+    assert re.search(r" 25%\|.*\| 1 of 4 pictures \[00:0\d, .* left\]", stream.getvalue())
+    progress.PictureBar().close()  # of a movie that was refused before its first picture
+
+
+def test_lines_of_pictures_are_seconds_apart(clock, capsys):
+    lines = progress.Pictures()
+    lines.start(7)
+    for _ in range(7):
+        clock.now += 3.0
+        lines.drew()
+    assert capsys.readouterr().err == "drew 4 of 7 pictures\n"
+
+
 def on_terminal(monkeypatch, columns):
     monkeypatch.setattr(sys, "stderr", SimpleNamespace(isatty=lambda: True, fileno=lambda: 2))
     monkeypatch.setattr(os, "get_terminal_size", lambda descriptor: os.terminal_size((columns, 24)))
@@ -161,12 +182,14 @@ def test_progress_is_bar_on_terminal_and_lines_elsewhere(monkeypatch):
     assert type(progress.suited()) is progress.Lines  # the tests' own stderr is no terminal
     on_terminal(monkeypatch, 80)
     assert type(progress.suited()) is progress.Bar
+    assert type(progress.suited_to_pictures()) is progress.PictureBar
     monkeypatch.setattr(progress.IterationBar, "__init__", lambda *_: None)  # stderr takes no text
     assert type(progress.suited_to_iterations("relaxing", 9)) is progress.IterationBar
     on_terminal(monkeypatch, 0)
     assert type(progress.suited_to_iterations("relaxing", 9)) is progress.Iterations
     assert type(progress.suited()) is progress.Lines
     assert type(progress.suited_to_runs("points", 2)) is progress.RunLines
+    assert type(progress.suited_to_pictures()) is progress.Pictures
     on_terminal(monkeypatch, 80)
     assert type(progress.suited_to_runs("trials", None)) is progress.RunLines
 

@@ -1,6 +1,6 @@
 """Pictures of runs and checkpoints: `draw` selects them; each module draws one kind."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from matplotlib.figure import Figure
@@ -9,7 +9,8 @@ from sph.analysis import truth
 from sph.analysis.figures import history, maps, profiles, style
 from sph.analysis.figures.main import main_picture, shows_profiles
 from sph.analysis.figures.sources import Source, State, find_source, labels
-from sph.analysis.figures.view import View, figure, states_at
+from sph.analysis.figures.times import states_at
+from sph.analysis.figures.view import View, figure
 from sph.errors import ConfigError
 from sph.output.files import explained, refuse_link, replacing
 from sph.output.history import read as read_history
@@ -25,16 +26,19 @@ def draw(
     view: View | None = None,
     times: Sequence[float] = (),
     dpi: int | None = None,
+    say: Callable[[str], object] = lambda _line: None,
 ) -> list[Path]:
     """Draw runs or checkpoints; returns the files written.
 
     Without `target` a run gets a set of pictures in its figures/, a checkpoint one picture there,
     or beside it where it is in no run. With `target` the main picture of one source goes there, or
     one picture that compares several; its suffix says in which format. With `view` or `times` each
-    source gets one picture of the checkpoints nearest to `times`, by default of the last: a map, or
-    profiles of a 1-D run. dpi: pixels per inch, by default style.DPI.
-    Raises ConfigError for a suffix that is none of FORMATS and for sources that one picture cannot
-    compare, FileError for what is missing, damaged or cannot be written.
+    source gets one picture of the checkpoints or frames nearest to `times`, by default of the last
+    checkpoint: a map, or profiles of a 1-D run. dpi: pixels per inch, by default style.DPI. say: is
+    called with a line for each time that is drawn in place of another one.
+    Raises ConfigError for a suffix that is none of FORMATS, for sources that one picture cannot
+    compare, for views that cannot be drawn and for times beyond the run, FileError for what is
+    missing, damaged or cannot be written.
     """
     if target is not None:
         _check_format(Path(target))
@@ -43,7 +47,10 @@ def draw(
         if view or times:
             if target is not None and len(found) > 1:
                 raise ConfigError("options of maps and times need one source with -o.")
-            return [_draw_view(source, target, view or View(), times) for source in found]
+            return [
+                _draw_view(source, target, view or View(), states_at(source, times, say))
+                for source in found
+            ]
         if target is None:
             return [path for source in found for path in _draw_own(source)]
         states = [source.last() for source in found]
@@ -80,8 +87,7 @@ def _draw_own(source: Source) -> list[Path]:
     return [_save(picture, run.figures / f"{name}.png") for name, picture in _pictures(source, run)]
 
 
-def _draw_view(source: Source, target: Path | None, view: View, times: Sequence[float]) -> Path:
-    states = states_at(source, times)
+def _draw_view(source: Source, target: Path | None, view: View, states: Sequence[State]) -> Path:
     if states[-1].dimension == 1 and view == View():
         picture, name = profiles.over_time(states), "profiles_at_times"
     else:
@@ -94,7 +100,8 @@ def _pictures(source: Source, run: RunDirectory):
     """(name, figure) of each picture of a run's set, one at a time to hold one in memory."""
     last = source.last()
     states = source.over_time(MOST_TIMES)
-    if shows_profiles(last) or last.dimension == 3:
+    # over x or the radius; shapes of the user's own are in general functions of neither
+    if shows_profiles(last) or (last.dimension == 3 and last.problem.profiled):
         yield "profiles", profiles.single(last)
     if last.dimension > 1:
         yield "slice" if last.dimension == 3 else "map", maps.single(last)

@@ -25,6 +25,7 @@ STYLES = ("-", "--", "-.")
 # Momentum that changes by less, in units of the momentum at which all energy would be kinetic, is
 # conserved to round-off of sums of many particles, and its panel would show noise.
 ROUND_OFF = 1e-12
+SMALL_CHANGE = 1e-3  # of a diagnostic, as a part of its first value: only the change is drawn
 COLOURS = (*style.PALETTE, "black", "#999999", "#882255", "#44aa99", "#ddcc77")
 
 
@@ -175,10 +176,14 @@ def _steps(panel, history) -> None:
 
 def _diagnostic(panel, history, name: str, theory: np.ndarray | None) -> None:
     values = history[name]
+    panel.set_ylabel(_words(name))
+    if np.ptp(values) < SMALL_CHANGE * abs(values[0]):  # the ticks would all begin with its digits
+        panel.set_ylabel(f"{_words(name)}\nless {values[0]:.6g}")
+        theory = None if theory is None else theory - values[0]
+        values = values - values[0]
     panel.plot(history["t"], values, color=style.PALETTE[0], label="this run")
     if theory is not None:
         panel.plot(history["t"], theory, "--", color="black", label="theory")
         _legend_above(panel)
-    panel.set_ylabel(_words(name))
     if np.all(values > 0.0) and values.max() > DECADE * values.min():
         panel.set_yscale("log")

@@ -134,7 +134,8 @@ def watch(
             with style.paper(dpi):
                 picture = figure([state], view) if view else main_picture(state)
                 words = shown.show(picture)
-            say(f"{words}: {state.when.replace('$', '')}")
+            unit = state.units.symbol(0, 0, 1)
+            say(f"{words}: t = {state.time:.4g} {unit}".rstrip())
         if not shown.wait(POLL):
             return "the window was closed"
     status = directory.read_summary().get("status")

@@ -7,7 +7,8 @@ from typing import NamedTuple
 import numpy as np
 from matplotlib.figure import Figure
 
-from sph.analysis.figures import style
+from sph.analysis.figures import outlines, style
+from sph.analysis.figures.outlines import AT_SURFACE
 from sph.analysis.figures.sources import State
 from sph.analysis.interpolate import Plane, with_cover
 from sph.analysis.projection import along_sight
@@ -15,9 +16,7 @@ from sph.analysis.projection import along_sight
 PIXELS = 512  # on the longer side
 PIXELS_OF_MANY = 320
 LONGEST_SIDE = 3.6  # inches, of a map that stands with one other
-AT_SURFACE = 0.5  # sum of V W at a plane surface of matter that ends at its particles
 WIDEST_RATIO = 8.0  # of sides drawn to scale; thinner domains are stretched
-MOST_OUTLINES = 12  # bodies of which outlines are drawn
 LONGEST_TITLE = 40  # letters in a line above a map that stands with others
 WIDEST = 9.0  # inches, of a picture of many maps
 
@@ -27,13 +26,14 @@ def single(state: State) -> Figure:
     names = (main_field(state), second_field(state))
     plane = plane_of(state, PIXELS)
     images, opacity = _images(state, names, plane)
+    bodies = outlines.shares(state, plane)
     columns, width, height = _arrangement(plane, 2, 2 * LONGEST_SIDE)
     figure = style.new_figure(columns * (width + 1.0), 2 // columns * height + 1.0, "compressed")
     panels = figure.subplots(2 // columns, columns, squeeze=False)
     for panel, name, values in zip(panels.flat, names, images, strict=True):
         image = _show(panel, values, opacity, plane, name, style.scale(values))
-        figure.colorbar(image, ax=panel, pad=0.02, extend=_extends(image))
-        _outline(panel, state, plane)
+        figure.colorbar(image, ax=panel, pad=0.02, extend=_extends([values], image.norm))
+        outlines.draw(panel, plane, bodies)
         panel.set_title(state.labelled(style.label(name), name))
     _label_axes(panels, 2, _axes(state, plane))
     figure.suptitle(f"{state.title}, {state.when}{_where(plane, state)}")
@@ -96,11 +96,14 @@ def common_plane(states: Iterable[State], pixels: int) -> Plane:
     return _plane(*common_frame(states), pixels)
 
 
-def common_frame(states: Iterable[State]) -> tuple[np.ndarray, State]:
-    """(D, 2) the part of space that holds the gas of all states, and the last state."""
+def common_frame(states: Iterable[State], has_all: bool = False) -> tuple[np.ndarray, State]:
+    """(D, 2) the part of space that holds the gas of all states, and the last state.
+
+    has_all: along open axes as far as any kernel reaches, not only nearly all gas.
+    """
     frames = []
     for state in states:
-        frames.append(_frame(state))
+        frames.append(_filled(state) if has_all else _frame(state))
     low, high = np.array(frames)[..., 0].min(axis=0), np.array(frames)[..., 1].max(axis=0)
     return np.stack([low, high], axis=1), state
 
@@ -113,6 +116,16 @@ def _frame(state: State) -> np.ndarray:
         if boundary == "open":
             low, high = np.percentile(state.particles.position[axis], [0.1, 99.9])
             box[axis] = low - margin, high + margin
+    return box
+
+
+def _filled(state: State) -> np.ndarray:
+    """(D, 2) the domain; along open axes the range that the kernels of all particles reach."""
+    box, particles = state.problem.box.copy(), state.particles
+    for axis, boundary in enumerate(state.problem.boundaries):
+        if boundary == "open":
+            x = particles.position[axis]
+            box[axis] = (x - particles.support).min(), (x + particles.support).max()
     return box
 
 
@@ -132,6 +145,7 @@ class _Map(NamedTuple):
     what: str  # for the title
     quantity: str  # name, symbol and unit of the field
     axes: list[str]  # their labels
+    bodies: np.ndarray  # (B, ny, nx) of `outlines.shares`
 
 
 def drawn(state: State, plane: Plane, label: str, what: str, field: str | None = None) -> _Map:
@@ -139,12 +153,13 @@ def drawn(state: State, plane: Plane, label: str, what: str, field: str | None =
     field = field or main_field(state)
     if state.dimension == 3 and plane.height is None:
         field, values, quantity = _projected(state, field, plane)
-        opacity = None
+        opacity, bodies = None, np.zeros((0, *values.shape))
     else:
+        bodies = outlines.shares(state, plane)
         (values,), opacity = _images(state, [field], plane)
         quantity = state.labelled(style.label(field), field)
     what += _where(plane, state)
-    return _Map(values, opacity, field, plane, label, what, quantity, _axes(state, plane))
+    return _Map(values, opacity, field, plane, label, what, quantity, _axes(state, plane), bodies)
 
 
 def _projected(state: State, field: str, plane: Plane) -> tuple[str, np.ndarray, str]:
@@ -173,13 +188,15 @@ def side_by_side(maps: Sequence[_Map], scale=None) -> Figure:
     panels = figure.subplots(rows, columns, squeeze=False)
     for panel, one in zip(panels.flat, maps, strict=False):
         image = _show(panel, one.values, one.opacity, one.plane, one.field, scale)
+        outlines.draw(panel, one.plane, one.bodies)
         panel.set_title(textwrap.fill(one.label, LONGEST_TITLE))
     shown, empty = np.split(panels.ravel(), [len(maps)])
     for panel in empty:
         panel.remove()
     differ = len({one.plane.extent for one in maps}) > 1
     _label_axes(panels, len(maps), maps[0].axes, differ)
-    bar = figure.colorbar(image, ax=list(shown), pad=0.015, aspect=30, extend=_extends(image))
+    extends = _extends([one.values for one in maps], scale)
+    bar = figure.colorbar(image, ax=list(shown), pad=0.015, aspect=30, extend=extends)
     bar.set_label(", ".join(sorted({one.quantity for one in maps})))
     figure.suptitle("; ".join(sorted({one.what for one in maps})))
     return figure
@@ -192,7 +209,7 @@ def _images(state: State, names, plane: Plane) -> tuple[np.ndarray, np.ndarray |
     half of it. Solids and liquids end at their surface.
     """
     values = np.stack([state.scalar(name) for name in names])
-    means, cover = _interpolated(state, values, plane)
+    means, cover = with_cover(values, state.particles, state.domain, state.kernel, plane)
     if state.has_surface:
         return np.where(cover > AT_SURFACE, means, np.nan), None
     if "open" not in state.problem.boundaries:
@@ -200,24 +217,6 @@ def _images(state: State, names, plane: Plane) -> tuple[np.ndarray, np.ndarray |
     # from the last particles outwards, until they would be seen no more
     opacity = np.clip(2.0 * cover / AT_SURFACE - 1.0, 0.0, 1.0)
     return np.where(opacity > 0.0, means, np.nan), opacity
-
-
-def _interpolated(state: State, values: np.ndarray, plane: Plane):
-    return with_cover(values, state.particles, state.domain, state.kernel, plane)
-
-
-def _outline(panel, state: State, plane: Plane) -> None:
-    """Draw the outlines of several solid bodies, which may touch each other."""
-    body = state.particles.get("body")
-    numbers = np.unique(body) if body is not None else np.zeros(0)
-    if not 2 <= numbers.size <= MOST_OUTLINES:
-        return
-    shares, cover = _interpolated(state, np.stack([body == one for one in numbers]), plane)
-    shares = np.where(cover > AT_SURFACE, shares, 0.0)
-    step = (plane.high - plane.low) / np.array(plane.shape)
-    x, y = (plane.low[d] + step[d] * (np.arange(plane.shape[d]) + 0.5) for d in range(2))
-    for share in shares:
-        panel.contour(x, y, share, levels=[0.5], colors="white", linewidths=0.7)
 
 
 def _show(panel, values, opacity, plane: Plane, name: str, scale):
@@ -240,9 +239,13 @@ def _drawn_ratio(plane: Plane) -> float:
     return float(np.clip(_ratio(plane), 1.0 / WIDEST_RATIO, WIDEST_RATIO))
 
 
-def _extends(image) -> str:
-    """Which end of the scale cuts values off: the lower one of a map of many decades."""
-    return "min" if np.nanmin(image.get_array()) < image.norm.vmin else "neither"
+def _extends(maps: Sequence[np.ndarray], scale) -> str:
+    """Which ends of the scale cut values off: --range, or the lower one of many decades."""
+    below = any((values < scale.vmin).any() for values in maps)
+    above = any((values > scale.vmax).any() for values in maps)
+    return {(True, True): "both", (True, False): "min", (False, True): "max"}.get(
+        (below, above), "neither"
+    )
 
 
 def _arrangement(plane: Plane, count: int, widest: float) -> tuple[int, float, float]:
@@ -274,7 +277,9 @@ def _label_axes(panels, count: int, labels: Sequence[str], differ: bool = False)
 def _where(plane: Plane, state: State) -> str:
     where, name = "", f"${'xyz'[plane.third]}$"
     if plane.height is not None:
-        where = f", at {name} = {plane.height:.4g} {state.units.symbol(1, 0, 0)}".rstrip()
+        where = (
+            f", at {name} = {style.shortest(plane.height)} {state.units.symbol(1, 0, 0)}".rstrip()
+        )
     elif state.dimension == 3:
         where = f", projected along {name}"
     return where + (", not to scale" if _ratio(plane) != _drawn_ratio(plane) else "")

@@ -20,6 +20,7 @@ from sph.analysis.figures.view import View
 from sph.analysis.interpolate import Plane
 from sph.errors import ConfigError
 from sph.output.files import explained, refuse_link, replacing
+from sph.progress import Pictures
 
 FORMATS = (".gif", ".mp4")
 COLOURS = 256  # of a gif
@@ -28,13 +29,14 @@ Drawn = Callable[[States], Iterator[np.ndarray]]  # the pixels of the frames of 
 
 
 def make(
-    source: Path, target: Path | None, view: View, per_second: int = 10, dpi: int | None = None
-) -> Path:
+    source: Path, target: Path | None, view: View, per_second: int = 10, dpi: int | None = None,
+    shown: Pictures | None = None,
+) -> Path:  # fmt: skip
     """Write a movie of the run `source`; returns its path, by default figures/movie.gif.
 
     Frames of the run or, without these, checkpoints are read three times, one at a time: for the
     part of the domain that all share, for the scale of colours, and for the pictures; those of 1-D
-    runs twice. per_second: pictures. dpi: by default style.DPI.
+    runs twice. per_second: pictures. dpi: by default style.DPI. shown: is told of each picture.
     Raises ConfigError for other suffixes than FORMATS, for .mp4 without imageio-ffmpeg and for
     views that cannot be drawn, FileError for what is missing, damaged or cannot be written.
     """
@@ -44,8 +46,11 @@ def make(
     with style.paper():
         picture = _pictures(states, view, found.last())
         path = Path(target) if target else _in_figures(found)
-        drawn = functools.partial(_frames, drawn=picture, dpi=dpi or style.DPI)
+        shown = shown or Pictures()
+        drawn = functools.partial(_frames, drawn=picture, dpi=dpi or style.DPI, shown=shown)
         with replacing(path) as unfinished:
+            extra = 2 if write is _write_gif else 0  # for its palette
+            shown.start(len(states.paths) + extra)
             write(drawn, states, unfinished, per_second)
     return path
 
@@ -74,14 +79,20 @@ def _scale(states: States, view: View, plane: Plane) -> Normalize:
     ends, middle = [], []
     for state in states:
         values = maps.drawn(state, plane, "", "", view.field).values
-        ends += [np.nanmin(values), np.nanmax(values)]
-        middle.append(np.nanmedian(values))
-    if view.is_log:
+        values = values[np.isfinite(values)]
+        if values.size:  # there may be no matter in --zoom or --slice
+            ends += [values.min(), values.max()]
+            middle.append(np.median(values))
+    if not ends:
+        return style.scale(np.zeros(0))
+    if view.is_log or view.is_linear:
         return view.scale(min(ends), max(ends))
     return style.scale(np.array([*ends, *np.repeat(middle, 2)]))
 
 
-def _frames(states: States, drawn: Callable[[State], Figure], dpi: int) -> Iterator[np.ndarray]:
+def _frames(
+    states: States, drawn: Callable[[State], Figure], dpi: int, shown: Pictures
+) -> Iterator[np.ndarray]:
     """(height, width, 3) bytes of each frame; sides are even, as codecs of video ask."""
     for state in states:
         picture = drawn(state)
@@ -90,6 +101,7 @@ def _frames(states: States, drawn: Callable[[State], Figure], dpi: int) -> Itera
         canvas.draw()
         pixels = np.asarray(canvas.buffer_rgba())[..., :3]
         height, width = (side - side % 2 for side in pixels.shape[:2])
+        shown.drew()
         yield np.ascontiguousarray(pixels[:height, :width])
 
 

@@ -119,7 +119,8 @@ def _figure(
     entries = [*zip(drawn, labels, strict=True), *((line, truth) for line in exact[:1])]
     figure.legend(
         *zip(*entries, strict=True), loc="outside lower center", markerscale=2.0,
-        ncols=7 if max(map(len, labels)) < 15 else 2, columnspacing=1.4, handletextpad=0.4,
+        ncols=7 if max(map(style.letters, labels)) < 15 else 2, columnspacing=1.4,
+        handletextpad=0.4,
     )  # fmt: skip
     return figure
 

@@ -19,9 +19,9 @@ MARKERS = "osD^vP*X"
 FRONT = "0.75"
 GUIDE = "0.55"
 ORDERS = (1, 2)  # of the guide lines
-ABOVE = 1.6  # the guide lines above the nearest point, as a ratio of errors
-ROOM_FOR_GUIDES = 4.0  # the same of the frame above the largest error
-LABEL_AT = 0.3  # of a guide line's length
+ABOVE = 1.3  # the guide lines above the nearest point, as a ratio of errors
+MOST_ROOM = 4.0  # the same of the frame above the largest error
+AROUND = 0.06  # of the height of the frame, between its ends and what is drawn
 MANY = 12  # lines of a legend beyond which its letters shrink
 MOST_COLUMNS = 3  # of panels
 WIDEST_WITHIN = 46  # letters of size 8 that a panel has room for
@@ -178,22 +178,33 @@ def _front(panel, report: Report) -> None:
 
 
 def _guides(panel, x: np.ndarray, error: np.ndarray, slopes: dict[int, float]) -> None:
-    """Dotted lines of those slopes above all that is drawn, so that they cross no curve."""
-    if np.unique(x).size < 2:
+    """Dotted lines of those slopes above all that is drawn, so that they cross no curve.
+
+    The steeper line ends at or above the end of the other, so that they do not cross each other.
+    """
+    if np.unique(x).size < 2 or not slopes:
         return
+    levels, reached = {}, 0.0
+    for p in sorted(slopes):
+        at_end = x.max() ** slopes[p]
+        levels[p] = max(ABOVE * (error / x ** slopes[p]).max(), reached / at_end)
+        reached = levels[p] * at_end
+    highest = max(level * x.min() ** slopes[p] for p, level in levels.items())
     (left, right), (bottom, top) = panel.get_xlim(), panel.get_ylim()
-    top = max(top, ROOM_FOR_GUIDES * error.max())
+    top = max(top, min(highest, MOST_ROOM * error.max()))
+    around = (top / bottom) ** AROUND
+    bottom, top = bottom / around, top * around
     panel.set_xlim(left, right)
     panel.set_ylim(bottom, top)
     for p, slope in slopes.items():
-        level = ABOVE * (error / x**slope).max()
+        level = levels[p]
         start, end = max(x.min(), (top / level) ** (1.0 / slope)), x.max()
         if start >= end:
             continue
         panel.plot([start, end], level * np.array([start, end]) ** slope, ":", color=GUIDE, lw=1)
-        at = start ** (1.0 - LABEL_AT) * end**LABEL_AT
+        # at the end where the lines are farthest from each other
         panel.annotate(
-            f"order {p}", (at, level * at**slope), color=GUIDE, fontsize=9, xytext=(2, 2),
+            f"order {p}", (start, level * start**slope), color=GUIDE, fontsize=9, xytext=(4, 1),
             textcoords="offset points",
         )  # fmt: skip
 

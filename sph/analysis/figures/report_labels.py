@@ -27,10 +27,11 @@ def value_alone(label: str) -> str:
 
 
 def tick(value: float, _position=None) -> str:
-    """0.05, 300 or 2 x 10^-5."""
+    """0.05, 300 or 1.5 x 10^-5."""
     if 1e-3 <= value < 1e4:
         return f"{value:g}"
-    mantissa, exponent = f"{value:.0e}".split("e")
+    mantissa, exponent = f"{value:.1e}".split("e")
+    mantissa = mantissa.removesuffix(".0")
     power = f"10^{{{int(exponent)}}}"
     return f"${power}$" if mantissa == "1" else rf"${mantissa}\times {power}$"
 

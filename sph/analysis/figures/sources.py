@@ -42,18 +42,6 @@ class Source:
         """The last state. Raises FileError."""
         return State(checkpoint.read(self.checkpoints[-1]))
 
-    def state(self, k: int) -> "State":
-        """The state of checkpoint `k`. Raises FileError."""
-        return State(checkpoint.read(self.checkpoints[k]))
-
-    def nearest(self, time: float) -> int:
-        """The number of the checkpoint nearest to `time`. Raises FileError."""
-        return int(np.argmin(np.abs(self._times - time)))
-
-    @cached_property
-    def _times(self) -> np.ndarray:
-        return np.array([checkpoint.read(path).time for path in self.checkpoints])
-
     def over_time(self, most: int) -> "States":
         """The first, the last and others between them, at most `most`, as even as that allows."""
         return States([self.checkpoints[i] for i in evenly(len(self.checkpoints), most)])
@@ -211,7 +199,7 @@ class State:
 
     @property
     def when(self) -> str:
-        return f"$t$ = {self.time:.4g} {self.units.symbol(0, 0, 1)}".rstrip()
+        return f"$t$ = {style.shortest(self.time)} {self.units.symbol(0, 0, 1)}".rstrip()
 
     @property
     def units(self):

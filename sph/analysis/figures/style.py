@@ -108,8 +108,12 @@ def unit_symbol(unit: str, units) -> str:
 
 def in_two_lines(label: str) -> str:
     """A label for a vertical axis: its unit is on a second line where one line is too long."""
-    is_long = len(LETTER.sub(" ", WIDTHLESS.sub("", label))) > LONGEST_LABEL
-    return label.replace(" [$", "\n[$") if is_long else label
+    return label.replace(" [$", "\n[$") if letters(label) > LONGEST_LABEL else label
+
+
+def letters(label: str) -> int:
+    """Letters that are seen, roughly: a command of mathematics shows as one or none."""
+    return len(LETTER.sub(" ", WIDTHLESS.sub("", label)))
 
 
 @contextmanager
@@ -163,6 +167,11 @@ def scale(values) -> Normalize:
     low, high = float(finite.min()), float(finite.max())
     if low > 0.0 and (high > 1000.0 * low or high > 10.0 * float(np.median(finite))):
         return LogNorm(lowest_of_log(low, high), high)
+    return linear(low, high)
+
+
+def linear(low: float, high: float) -> Normalize:
+    """A linear scale for values from `low` to `high`."""
     if high - low <= 1e-6 * abs(high):  # uniform gas: do not magnify round-off
         margin = 0.1 * abs(high) or 1.0
         return Normalize(low - margin, high + margin)
@@ -185,6 +194,12 @@ def number(value: float) -> str:
         return f"{value:.3g}"
     mantissa, exponent = f"{value:.2e}".split("e")
     return rf"${mantissa}\times10^{{{int(exponent)}}}$"
+
+
+def shortest(value: float) -> str:
+    """Up to four digits, e.g. 0.3 or 1.243 x 10^-5."""
+    mantissa, _, exponent = f"{value:.4g}".partition("e")
+    return rf"${mantissa}\times10^{{{int(exponent)}}}$" if exponent else mantissa
 
 
 def plain(text: str) -> str:

@@ -12,10 +12,11 @@ from sph import config, kernels, registry
 from sph.analysis import errors, figures
 from sph.analysis.figures import history, maps, profiles, style
 from sph.analysis.figures.sources import State, evenly, find_source, von_mises
-from sph.analysis.figures.view import View, figure, states_at
+from sph.analysis.figures.times import states_at
+from sph.analysis.figures.view import View, figure
 from sph.analysis.interpolate import with_cover
 from sph.errors import ConfigError, FileError
-from sph.output import checkpoint
+from sph.output import checkpoint, frames
 from sph.output.history import History
 from sph.output.history import read as read_history
 from sph.output.run_directory import RunDirectory
@@ -27,7 +28,7 @@ SMALL = {"shock_tube": 60, "point_explosion": 512, "particles": 4, "file": 1024}
 SETS = {
     1: {"profiles", "evolution", "history"},
     2: {"map", "evolution", "history"},
-    3: {"profiles", "slice", "evolution", "history"},
+    3: {"slice", "evolution", "history"},
 }
 
 
@@ -127,9 +128,9 @@ def test_run_of_every_problem_is_drawn(tmp_path, problem):
     states = [state_of(problem, time=0.0), state_of(problem)]
     run = write_run(tmp_path / "run", states)
     drawn = figures.draw([run.path])
-    expected = SETS[states[0].dimension] | (
-        {"profiles"} if states[-1].may_have_exact and states[0].problem.profiled else set()
-    )
+    D, problem = states[0].dimension, states[0].problem
+    has_profiles = D == 1 or (problem.profiled and (D == 3 or states[-1].may_have_exact))
+    expected = SETS[D] | ({"profiles"} if has_profiles else set())
     assert {path.stem for path in drawn} == expected
     for path in drawn:
         assert path.parent == run.figures
@@ -137,6 +138,15 @@ def test_run_of_every_problem_is_drawn(tmp_path, problem):
         # about 7 inches at 40 dpi; the white of the paper is not all there is on it
         assert min(picture.shape[:2]) > 80
         assert 0.01 < (picture.min(axis=2) < 0.7).mean() < 0.99
+
+
+def test_own_shapes_in_space_have_no_profiles_over_x(tmp_path):
+    shape = (
+        '{shape = "sphere", centre = [0.5, 0.5, 0.5], radius = 0.4, density = 1.0, pressure = 1.0}'
+    )
+    keys = ("problem.dimension=3", f"problem.region=[{shape}]", 'problem.boundary="open"')
+    run = write_run(tmp_path / "ball", [state_of("regions", *keys, time=t) for t in (0.0, 0.1)])
+    assert {path.stem for path in figures.draw([run.path])} == {"slice", "evolution", "history"}
 
 
 @pytest.mark.slow
@@ -504,6 +514,21 @@ def test_map_of_solid_ends_at_its_surface_and_outlines_bodies():
     assert middle == pytest.approx([0.0, 0.0], abs=0.05)
 
 
+def outlines_on(panel) -> int:
+    return len([one for one in panel.collections if len(one.get_paths()[0].vertices)])
+
+
+def test_every_map_of_solids_outlines_bodies():
+    state = solid_state()
+    # one field alone, as in movies; and several times, as in evolution.png
+    pictures = [figure([state], View("density")), maps.over_time([state, state], "von_mises")]
+    for picture in pictures:
+        panels = [panel for panel in picture.axes if panel.images]
+        assert [outlines_on(panel) for panel in panels] == [2] * len(panels)
+    # inside the left body no edge is seen
+    assert outlines_on(figure([state], View(zoom=(-0.6, -0.4, -0.1, 0.1))).axes[0]) == 0
+
+
 @pytest.mark.parametrize(
     ("stress", "expected"),
     # uniaxial stress s in 3-D; in 2-D and 1-D the other normal stresses keep S without trace
@@ -595,13 +620,15 @@ def test_thin_domain_is_stretched_and_says_so():
 
 def test_view_sets_field_scale_and_part(shear):
     source = find_source(shear.path)
-    states = states_at(source, [0.4, 0.1, 0.45])
+    lines = []
+    states = states_at(source, [0.4, 0.1, 0.45], lines.append)
     assert [state.time for state in states] == [0.0, 0.5]
-    view = View("pressure", (2.0, 3.0), True, (0.1, 0.4, -0.2, 0.0))
+    assert len(lines) == 3
+    view = View("pressure", (2.0, 3.0), True, (0.1, 0.4, 0.2, 0.4))
     images = [panel.images[0] for panel in figure(states, view).axes if panel.images]
     assert len(images) == 2
     for image, state in zip(images, states, strict=True):
-        assert image.get_extent() == [0.1, 0.4, -0.2, 0.0]
+        assert image.get_extent() == [0.1, 0.4, 0.2, 0.4]
         assert isinstance(image.norm, LogNorm)
         assert (image.norm.vmin, image.norm.vmax) == (2.0, 3.0)
         pressure = state.scalar("pressure")
@@ -622,11 +649,79 @@ def test_views_draw_one_picture_each(shear, tube, tmp_path):
 @pytest.mark.parametrize(
     "view",
     [View("von_mises"), View(limits=(2.0, 1.0)), View(limits=(0.0, 1.0), is_log=True),
-     View(zoom=(0.0, 1.0, 1.0, 0.0)), View(slice=(2, 0.5)), View(projection=0)],
+     View(zoom=(0.0, 1.0, 1.0, 0.0)), View(slice=(2, 0.5)), View(projection=0),
+     View(is_log=True, is_linear=True)],
 )  # fmt: skip
 def test_view_that_cannot_be_drawn_is_refused(messages, shear, view):
     with messages.raised(ConfigError):
         figures.draw([shear.path], view=view)
+
+
+def test_zoom_ends_at_closed_ends_of_domain(messages, shear):
+    (state,) = [find_source(shear.path).last()]
+    (low, high), (bottom, top) = state.problem.box
+    side = high - low
+    picture = figure([state], View(zoom=(high - 0.2 * side, high + side, bottom - 1.0, top)))
+    extent = picture.axes[0].images[0].get_extent()
+    assert extent == pytest.approx([high - 0.2 * side, high, bottom, top])
+    # images of the particles beyond the domain are no data
+    with messages.raised(ConfigError):
+        figure([state], View(zoom=(high, high + side, bottom, top)))
+
+
+def test_zoom_in_open_domain_may_show_vacuum_beside_particles(messages):
+    state = state_of("keplerian_ring")
+    view = View(zoom=(1.0, 9.0, -1.0, 1.0))
+    assert figure([state], view).axes[0].images[0].get_extent() == [1.0, 9.0, -1.0, 1.0]
+    with messages.raised(ConfigError):
+        figure([state], View(zoom=(8.0, 9.0, -1.0, 1.0)))
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "extend"),
+    [(0.5, 3.0, "neither"), (1.5, 3.0, "min"), (0.5, 1.5, "max"), (1.4, 1.6, "both")],
+)
+@pytest.mark.parametrize("is_log", [False, True])
+def test_colour_bar_has_arrow_where_it_cuts_values(shear, low, high, extend, is_log):
+    state = find_source(shear.path).last()
+    state.particles.density[:] = 1.5 + state.particles.position[0]  # x from -0.5 to 0.5
+    picture = figure([state], View("density", (low, high), is_log))
+    assert picture.axes[0].images[0].colorbar.extend == extend
+
+
+def test_linear_scale_is_kept_where_it_would_be_logarithmic(shear):
+    state = find_source(shear.path).last()
+    state.particles.density[:] = 10.0 ** (4.0 * state.particles.position[0])
+    norms = [
+        figure([state], View(is_linear=is_linear)).axes[0].images[0].norm
+        for is_linear in (False, True)
+    ]
+    assert [isinstance(norm, LogNorm) for norm in norms] == [True, False]
+    assert norms[1].vmax == norms[0].vmax
+
+
+def test_times_beyond_run_are_refused(messages, shear):
+    lines = []
+    for time in (0.6, -0.1):
+        with messages.raised(ConfigError):
+            figures.draw([shear.path], times=[time], say=lines.append)
+    # 1 % of the run beyond its end is the end, which is said
+    figures.draw([shear.path], times=[0.5, 0.504], say=lines.append)
+    assert lines == ["--time 0.504: the nearest checkpoint or frame is that of t = 0.5"]
+    with messages.raised(ConfigError):
+        figures.draw([shear.checkpoint_path(0)], times=[0.5])
+
+
+def test_time_finds_frames_between_checkpoints(shear):
+    with shear.frames.held():
+        for step, time in ((1, 0.1), (2, 0.2), (3, 0.5)):
+            state = state_of("kelvin_helmholtz", time=time)
+            path = shear.frames.path_of(step)
+            frames.write(path, state.particles, state.scalar("pressure"), time, step)
+    states = states_at(find_source(shear.path), [0.0, 0.14, 0.22, 0.5], lambda _line: None)
+    assert [state.time for state in states] == [0.0, 0.1, 0.2, 0.5]
+    kinds = [isinstance(state.checkpoint, frames.Frame) for state in states]
+    assert kinds == [False, True, True, False]  # a checkpoint where both are as near
 
 
 def test_map_of_line_is_refused(messages, tube):
@@ -682,6 +777,12 @@ def test_pictures_of_slices_have_names_of_their_own(blast):
         for view in (View(), View(slice=(0, 0.1)), View("speed", projection=1))
     ]
     assert names == ["map_of_density.png", "slice_x_of_density.png", "projection_y_of_speed.png"]
+
+
+def test_slice_outside_open_domain_is_refused_with_range_of_particles(messages):
+    state = state_of("expanding_ball", "problem.dimension=3", time=0.0)
+    with messages.raised(ConfigError, "the range that particles reach"):
+        figure([state], View(slice=(2, 50.0)))
 
 
 def test_slice_outside_or_with_projection_is_refused(messages, blast):
@@ -746,6 +847,14 @@ def test_history_figure_names_constants_in_place_of_flat_panels(shear):
     assert "held supports" in [panel.get_ylabel() for panel in history.figure(found, "a").axes]
 
 
+def test_history_figure_draws_small_change_of_diagnostic(shear):
+    found = read_history(shear.history)
+    found["volume_ratio"] = np.array([0.9938, 0.9941])
+    panel = history.figure(found, "a run").axes[-1]
+    assert panel.get_ylabel().endswith("\nless 0.9938")
+    assert lines(panel)[0][1] == pytest.approx([0.0, 0.0003])
+
+
 def test_history_legends_cover_no_data(shear):
     picture = history.figure(read_history(shear.history), "a run")
     picture.draw_without_rendering()
@@ -796,6 +905,14 @@ def test_colour_scale_covers_range_without_blowing_up_round_off():
 )
 def test_axis_number_text(value, text):
     assert style.number(value) == text
+
+
+@pytest.mark.parametrize(
+    ("value", "text"),
+    [(0.0, "0"), (0.3, "0.3"), (4e-5, r"$4\times10^{-5}$"), (12430.0, r"$1.243\times10^{4}$")],
+)
+def test_time_text_has_no_e_notation(value, text):
+    assert style.shortest(value) == text
 
 
 def test_picture_target_link_is_refused(messages, tube, tmp_path):

@@ -8,6 +8,7 @@ from click.testing import CliRunner
 from PIL import Image, ImageSequence
 from test_figures import low_resolution, state_of, tube, write_run  # noqa: F401 - fixtures
 
+from sph import progress
 from sph.analysis.figures import movie, profile_axes, profiles
 from sph.analysis.figures.sources import find_source
 from sph.analysis.figures.view import View
@@ -143,10 +144,33 @@ def test_movie_of_line_with_map_or_of_checkpoint_is_refused(messages, growing, t
         movie.make(growing.checkpoint_path(1), None, View())
 
 
+def test_movie_tells_of_each_picture(growing, tmp_path, monkeypatch):
+    class Shown(progress.Pictures):
+        def note(self, text):
+            told.append(text)
+
+    told = []
+    monkeypatch.setattr(progress, "LINE_INTERVAL", 0.0)
+    movie.make(growing.path, tmp_path / "a.gif", View(), dpi=20, shown=Shown())
+    # three frames, and two for the palette
+    assert told == [f"drew {k} of 5 pictures" for k in range(1, 6)]
+
+
+def test_scale_of_movie_without_matter_in_view(growing):
+    view = View(is_log=True)
+    plane = view.plane(find_source(growing.path).over_time(9), 8)
+    nothing = [state_of("kelvin_helmholtz", time=0.0)]
+    nothing[0].particles.density[:] = np.nan
+    scale = movie._scale(nothing, view._replace(field="density"), plane)
+    assert np.isfinite([scale.vmin, scale.vmax]).all()
+
+
 def test_commands_pass_their_options_on(growing, tmp_path):
     options = ["--field", "speed", "--range", "0.1", "0.2", "--zoom", "0", "0.2", "0", "0.1"]
     runner = CliRunner()
-    done = runner.invoke(main, ["plot", str(growing.path), *options, "--time", "0", "--time", "1"])
+    done = runner.invoke(
+        main, ["plot", str(growing.path), *options, "--time", "0", "--time", "0.2"]
+    )
     assert done.output == f"drew {growing.figures / 'map_of_speed.png'}\n"
     target = str(tmp_path / "a.gif")
     done = runner.invoke(main, ["movie", str(growing.path), *options, "-o", target, "--fps", "20"])

@@ -592,6 +592,9 @@ def test_pictures_show_every_run(study):
         inside = (report.cost >= start) & (report.cost <= end)
         assert inside.any()
         assert (level > np.log(report.error))[inside].all()  # no line crosses a curve
+    at = report.cost.max()
+    first, second = (line.get_ydata()[-1] for line in guides if line.get_xdata()[-1] == at)
+    assert second >= first * (1.0 - ROUND_OFF)  # the steeper line crosses the other nowhere
     panel = pictures.error_against_number(report).axes[0]
     assert any(line.get_label() == r"$\alpha$ = 1.0: order 1.00" for line in panel.lines)
     bars = pictures.phases(report).axes[0].containers
@@ -674,3 +677,14 @@ def test_picture_labels_are_short():
     )
     assert labels.value_alone("scheme = grad_h") == "grad_h"
     assert labels.value_alone("eta = 1.6") == "eta = 1.6"
+
+
+@pytest.mark.parametrize(
+    ("value", "text"),
+    [(300.0, "300"), (1e-4, "$10^{-4}$"), (1.5e-4, r"$1.5\times 10^{-4}$"),
+     (2e-4, r"$2\times 10^{-4}$")],
+)  # fmt: skip
+def test_ticks_of_one_decade_differ(value, text):
+    from sph.analysis.figures.report_labels import tick
+
+    assert tick(value) == text
