@@ -9,6 +9,9 @@ from numba.core import event
 # The phase in which Numba starts, on first use. `Clock.cpu` does not contain this phase.
 STARTING = "start of Numba"
 
+# The phase in which the problem makes its particles, or relaxes them.
+PLACING = "initial state"
+
 SHORTEST = 1e-9  # seconds: the clock's resolution
 
 

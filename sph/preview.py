@@ -124,9 +124,7 @@ def _sample(config: Config) -> Sample:
         simulation.advance(math.inf)
         timed += 1
     per_step = (clock.cpu - began) / timed
-    simulation.close()
-    clock.close()
-    return Sample(
+    sample = Sample(
         simulation.scene.described(),
         simulation.particles.number,
         neighbours_per_particle(simulation),
@@ -136,6 +134,13 @@ def _sample(config: Config) -> Sample:
         last_step,
         per_step,
     )
+    # what else a run compiles: steps in one call (`sph.steps`), and the figures of its summary
+    if simulation.time < config.time.end:
+        simulation.proceed(config.time.end, 1)
+    simulation.nearest()
+    simulation.close()
+    clock.close()
+    return sample
 
 
 def bytes_held(simulation) -> int:

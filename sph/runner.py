@@ -8,7 +8,7 @@ import numpy as np
 
 from sph import allocation, columns, faults
 from sph.analysis import reference, summary, trial
-from sph.clock import Clock
+from sph.clock import PLACING, Clock
 from sph.config import Config
 from sph.errors import DeclarationError, FileError, NumericalError, Stopped, first_line
 from sph.neighbours.search import Origin
@@ -22,7 +22,7 @@ from sph.output.run_directory import RunDirectory
 from sph.output.times import output_times
 from sph.scene import Scene
 from sph.shell_words import quoted
-from sph.simulation import PLACING, Simulation
+from sph.simulation import Simulation
 from sph.steps import MOST
 from sph.stop_signals import stop_signals
 from sph.threads import available_processors

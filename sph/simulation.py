@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 
 from sph import compile_cache, declarations, faults, passes, resolution, totals
-from sph.clock import STARTING, Clock
+from sph.clock import PLACING, STARTING, Clock
 from sph.individual import Individual
 from sph.integrators import leapfrog, step_size
 from sph.neighbours.order import number_of_blocks
@@ -22,8 +22,6 @@ from sph.watchdog import Watchdog
 # Each widening extends lists at least to the requested radius. A request is at most twice the
 # radius of the last one.
 MAX_WIDENINGS = 60
-
-PLACING = "initial state"  # the phase in which the problem makes its particles, or relaxes them
 
 
 class Simulation:

@@ -7,6 +7,12 @@ from contextlib import contextmanager, suppress
 
 NUMBERS = (signal.SIGINT, signal.SIGTERM)
 
+_noted: list[int] = []  # signals that `stop_signals` has received
+
+
+class Ended(BaseException):
+    """Work that leaves nothing to continue from ends because of a signal."""
+
 
 def name(number: int) -> str:
     """Return the name of a signal for messages: "Ctrl-C" or "SIGTERM"."""
@@ -37,6 +43,15 @@ def _say(text: str) -> None:
         os.write(2, f"{beginning}{text}\n".encode())
 
 
+def heed() -> None:
+    """Raise Ended if `stop_signals` has received a signal: it ends the process as if sent again.
+
+    For long work before the first checkpoint.
+    """
+    if _noted and threading.current_thread() is threading.main_thread():
+        raise Ended
+
+
 @contextmanager
 def stop_signals(second=None):
     """Yield a list to which the name of the first SIGINT or SIGTERM is added.
@@ -52,6 +67,7 @@ def stop_signals(second=None):
 
     def note(number, _frame):
         received.append(name(number))
+        _noted.append(number)
         for one in NUMBERS:
             signal.signal(one, second or before[one])
         _say(f"{received[0]}: stopping after this step; send it again to stop at once")
@@ -59,8 +75,16 @@ def stop_signals(second=None):
     before = {number: signal.getsignal(number) for number in NUMBERS}
     for number in NUMBERS:
         signal.signal(number, note)
+    is_ended = False
     try:
         yield received
+    except Ended:
+        is_ended = True
     finally:
+        first = [*_noted]
+        _noted.clear()
         for number in NUMBERS:
             signal.signal(number, before[number])
+    if is_ended:
+        signal.raise_signal(first[0])
+        raise KeyboardInterrupt  # reached if a handler of the caller ignores the signal

@@ -156,7 +156,11 @@ class Session(TypedDict):
         ),
     ]
     updates_per_cpu_second: Annotated[
-        int | None, Quantity("updates over cpu_seconds", "(CPU s)^-1")
+        int | None,
+        Quantity(
+            "updates over cpu_seconds without those of the initial state; none without steps",
+            "(CPU s)^-1",
+        ),
     ]
     cpu_seconds: Annotated[
         float,
@@ -221,6 +225,10 @@ class Summary(TypedDict):
         Quantity("figures of the problem, listed with it; none where the run failed"),
     ]
     conservation: Annotated[Conservation, Quantity("what the run conserved, at any step")]
+    # not in summaries of earlier versions
+    momentum_along: NotRequired[
+        Annotated[list[str], Quantity("axes along which nothing changes the momentum")]
+    ]
     nearest: Annotated[
         Nearest | None,
         Quantity("distance to the nearest neighbour at the end; none where the run failed"),

@@ -7,6 +7,7 @@ import numpy as np
 
 from sph import warnings
 from sph.analysis import errors, truth
+from sph.clock import PLACING
 from sph.config import restarts
 from sph.summary import Conservation, Cost, Relaxation, Status, Summary
 from sph.totals import Baseline
@@ -25,6 +26,8 @@ def of_run(
     """
     scene, particles = simulation.scene, simulation.particles
     inside, outside = scene.described()
+    # before the cost, which contains its compilation
+    nearest = None if status == "failed" else simulation.nearest()
     result: Summary = {
         "status": status,
         "reason": reason,
@@ -41,6 +44,7 @@ def of_run(
         "errors_left_out": None,
         "report": None,
         "conservation": conservation(history, particles, scene, simulation.baseline),
+        "momentum_along": _axes(scene),
         "nearest": None,
         "cost": cost(simulation, history),
         "compiled_in": inside,
@@ -48,11 +52,10 @@ def of_run(
     }
     if relaxation is not None:
         result["relaxation"] = relaxation
-    if status == "failed":
+    if nearest is None:
         result["errors_left_out"] = "the run failed"
     else:
         _judge(result, simulation, history)
-        nearest = simulation.nearest()
         result["nearest"] = {
             "median": float(np.median(nearest)), "smallest": float(nearest.min())
         }  # fmt: skip
@@ -107,6 +110,10 @@ def baseline(history) -> Baseline:
     )
 
 
+def _axes(scene) -> list[str]:
+    return ["xyz"[axis] for axis in np.flatnonzero(scene.keeps_momentum)]
+
+
 def _momentum_change(history, particles, scene) -> float | None:
     kept = np.flatnonzero(scene.keeps_momentum)
     if kept.size == 0:
@@ -130,6 +137,7 @@ def cost(simulation, history) -> Cost:
     clock = simulation.clock
     phases = {name: round(seconds, 4) for name, seconds in clock.seconds.items()}
     updates = simulation.updates_here
+    of_steps = clock.cpu - clock.seconds.get(PLACING, 0.0)
     return {
         "cpu_seconds": float(history["cpu_seconds"][-1]),
         "wall_seconds": float(history["wall_seconds"][-1]),
@@ -138,7 +146,9 @@ def cost(simulation, history) -> Cost:
         "session": {
             "steps": simulation.steps_here,
             "updates": updates,
-            "updates_per_cpu_second": round(updates / clock.cpu) if clock.cpu > 0 else None,
+            "updates_per_cpu_second": round(updates / of_steps)
+            if updates and of_steps > 0
+            else None,
             "cpu_seconds": round(clock.cpu, 4),
             "wall_seconds": round(clock.wall, 4),
             "compile_cpu_seconds": round(clock.compiling, 4),
@@ -181,7 +191,7 @@ def in_words(summary: Summary) -> str:
             f"  {name.replace('_', ' ')}: {value:.6g}"
             for name, value in (summary["report"] or {}).items()
         ),
-        _kept_in_words(summary["conservation"]),
+        _kept_in_words(summary),
         *_relaxation_in_words(summary),
         _cost_in_words(summary["cost"]),
     ]
@@ -212,7 +222,8 @@ def _errors_in_words(summary: Summary) -> str:
     return f"Error (L1 against {truth}, {errors['region']}): {fields}."
 
 
-def _kept_in_words(kept: Conservation) -> str:
+def _kept_in_words(summary: Summary) -> str:
+    kept = summary["conservation"]
     change, injected, ratio = kept["momentum_change"], kept["energy_injected"], kept["volume_ratio"]
     parts = [f"energy to {kept['energy_drift_max']:.2g}"]
     if injected:
@@ -220,11 +231,17 @@ def _kept_in_words(kept: Conservation) -> str:
     parts.append(
         "momentum is not conserved at walls, by clamps or in an external field"
         if change is None
-        else f"momentum to {change:.2g}"
+        else f"momentum{_along(summary)} to {change:.2g}"
     )
     if ratio is not None:
         parts.append(f"at the end sum m/rho is {ratio:.4g} of the volume")
     return f"Conserved, at worst over the run: {'; '.join(parts)}."
+
+
+def _along(summary: Summary) -> str:
+    """The axes that conserve momentum, unless all do."""
+    axes = summary.get("momentum_along", [])
+    return f" along {' and '.join(axes)}" if 0 < len(axes) < summary["dimension"] else ""
 
 
 def _relaxation_in_words(summary: Summary) -> list[str]:
@@ -233,15 +250,16 @@ def _relaxation_in_words(summary: Summary) -> list[str]:
     return [
         f"Glass, after {ended['iterations']} iterations: density error {ended['density_error']:.2g}"
         f" rms about a mean offset of {ended['mean_offset']:+.2g}; {ended['cpu_seconds']:.3g} CPU "
-        "s, which the cost includes."
+        "s, which the cost includes and the rate of updates leaves out."
     ]
 
 
 def _cost_in_words(cost: Cost) -> str:
     session = cost["session"]
-    rate = session["updates_per_cpu_second"] or 0
+    rate = session["updates_per_cpu_second"]
+    words = f"; {rate:,} particle updates per CPU-second" if rate else ""
     return (
         f"Cost: elapsed time {session['wall_seconds']:.3g} s, {session['cpu_seconds']:.3g} CPU s "
         f"on {cost['threads']} thread(s), and {session['compile_cpu_seconds']:.2g} CPU s for "
-        f"compilation; {rate:,} particle updates per CPU-second."
+        f"compilation{words}."
     )

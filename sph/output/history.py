@@ -140,6 +140,17 @@ def check(
             )
 
 
+def diagnostics_in(path: Path, dimension: int, optional: Sequence[str]) -> list[str]:
+    """Return the columns of a history that are neither those of every run nor `optional`.
+
+    Raises FileError if a column of every run is missing.
+    """
+    names, _ = _names_and_rows(Path(path))
+    ours = columns.shared(dimension)
+    _check_columns(Path(path), names, ours)
+    return [one for one in names if one not in (*ours, *optional)]
+
+
 def _of_another_run(path: Path, why: str) -> FileError:
     return FileError(
         f"{path} is damaged or belongs to another run: {why}.\nTry: an earlier checkpoint; or "

@@ -43,16 +43,21 @@ def check_history(path: Path, checkpoint: Checkpoint) -> None:
         }
         diagnostics = list(config.problem.diagnostics(p))
     optional = checkpoint.scene.columns
-    try:
-        history.check(path, p.dimension, diagnostics, optional, checkpoint.step, sums)
-    except FileError as error:
-        if not has_changed(config.problem):
-            raise
-        found = ", ".join(diagnostics) or "none"
+    if has_changed(config.problem):
+        before = history.diagnostics_in(path, p.dimension, optional)
+        _check_diagnostics(path, config.problem.origin, before, diagnostics)
+    history.check(path, p.dimension, diagnostics, optional, checkpoint.step, sums)
+
+
+def _check_diagnostics(path: Path, origin: str, before: list[str], now: list[str]) -> None:
+    """Raise FileError if the columns of a changed problem file are not those of the history."""
+    if set(before) != set(now):
         raise FileError(
-            f"{config.problem.origin} has changed since the run began, and its diagnostics "
-            f"({found}) may not be those of the run any more: {error}"
-        ) from None
+            f"{origin} has changed since the run began: its diagnostics return "
+            f"{', '.join(now) or 'nothing'}, but {path} has the columns of the run, "
+            f"{', '.join(before) or 'none'} of diagnostics. A history keeps its columns.\n"
+            f"Try: the same names in diagnostics as when the run began; or {history.ALONE}"
+        )
 
 
 def check_order(earlier: Path, later: Path, before: Checkpoint, after: Checkpoint) -> None:

@@ -12,6 +12,7 @@ from columns import as_columns
 from sph import config as configuration
 from sph import restarting, runner
 from sph.analysis import summary
+from sph.clock import PLACING
 from sph.integrators.step_size import StepLimit
 from sph.output.history import History
 from sph.output.history import read as read_history
@@ -400,7 +401,11 @@ def test_cost_reports_session_and_total_seconds(simulation):
             "list_builds": 6,
         },
     }
-    simulation.clock.cpu = 0.0
+    simulation.clock.seconds = {PLACING: 1.5}  # relaxation to a glass, which updates no particle
+    assert summary.cost(simulation, history)["session"]["updates_per_cpu_second"] == 1000
+    simulation.updates_here = 0
+    assert summary.cost(simulation, history)["session"]["updates_per_cpu_second"] is None
+    simulation.updates_here, simulation.clock.cpu = 1500, 0.0
     assert summary.cost(simulation, history)["session"]["updates_per_cpu_second"] is None
 
 

@@ -21,6 +21,7 @@ from sph import fingerprint, progress, registry, runner
 from sph.cli import main
 from sph.output.checkpoint import state_hash
 from sph.output.run_directory import RunDirectory
+from sph.problems.support import glass
 
 ROOT = Path(sph.__file__).parents[1]
 CONFIGS = Path(__file__).parents[2] / "configs"
@@ -150,7 +151,7 @@ def test_run_directory_has_documented_files(done):
     assert set(json.loads((run / "summary.json").read_text())) == {
         "status", "reason", "warnings", "version", "problem", "dimension", "particles", "time",
         "steps", "lineage", "settings_changed", "errors", "errors_left_out", "report",
-        "conservation", "nearest", "cost", "compiled_in",
+        "conservation", "momentum_along", "nearest", "cost", "compiled_in",
         "left_out",
     }  # fmt: skip
 
@@ -436,6 +437,39 @@ def test_interrupt_while_loading_shows_no_traceback(refused, config, monkeypatch
     monkeypatch.setattr(configuration, "load", interrupted)
     result = sph_("run", config)
     refused(result, 130, "sph: ended by Ctrl-C")
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM], ids=lambda one: one.name)
+def test_signal_during_relaxation_ends_there_and_leaves_nothing(number, tmp_path, monkeypatch):
+    pushes = []
+
+    def interrupted(position, *_):
+        pushes.append(position)
+        if len(pushes) == 1:
+            signal.raise_signal(number)
+        return 0.0 * position
+
+    monkeypatch.setattr(glass, "_push", interrupted)
+    config = tmp_path / "glass.toml"
+    config.write_text('[problem]\nname = "uniform"\ndimension = 2\nn = 100\nrelax = {}\n')
+    handler = signal.signal(number, signal.default_int_handler)  # as the process may have one
+    try:
+        result = sph_("run", config, "-o", tmp_path / "run")
+        assert signal.getsignal(number) is signal.default_int_handler
+    finally:
+        signal.signal(number, handler)
+    assert (result.exit_code, len(pushes)) == (130, 1), result.output
+    assert result.stderr.endswith("sph: ended by Ctrl-C\n")
+    assert [*tmp_path.iterdir()] == [config]
+
+
+@pytest.mark.slow
+def test_run_after_dry_run_compiles_nothing(config, tmp_path):
+    cache = {"NUMBA_CACHE_DIR": str(tmp_path / "cache")}
+    code, _, err = finished(started(tmp_path, "run", config, "--dry-run", **cache))
+    assert code == 0, err
+    code, _, err = finished(started(tmp_path, "run", config, "-o", "run", **cache))
+    assert (code, "compiling" in err) == (0, False), err
 
 
 @pytest.mark.slow

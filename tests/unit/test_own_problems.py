@@ -4,6 +4,7 @@ import hashlib
 import json
 import os
 import re
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -548,9 +549,29 @@ def test_restart_tries_changed_file_before_anything_changes(home):
     assert not (home / "again").exists()
 
 
-def test_restart_with_other_diagnostics_says_that_file_has_changed(home, messages):
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [('"kinetic_energy_x"', '"energy_x"'), ("def diagnostics", "def _none")],
+    ids=["renamed", "removed"],
+)
+def test_restart_with_other_diagnostics_says_that_file_has_changed(home, messages, old, new):
     run(home)
-    edited(home, '"kinetic_energy_x"', '"energy_x"')
+    edited(home, old, new)
+    middle = home / "run" / "checkpoints" / "checkpoint_000001.h5"
+    for options in ([], ["-o", home / "again"]):
+        done = sph_("restart", middle, *options)
+        assert done.exit_code == FileError.exit_code
+        assert not (home / "again").exists()
+    messages.check(done.stderr)
+    shutil.copy(middle, home / "copy.h5")  # the way out that the message names
+    done = sph_("restart", home / "copy.h5", "-o", home / "again")
+    assert done.exit_code == 0, done.output
+
+
+def test_restart_with_added_diagnostics_says_that_file_has_changed(home, messages):
+    (home / "clouds.py").write_text(CLOUDS.replace("def diagnostics", "def _none"))
+    run(home)
+    (home / "clouds.py").write_text(CLOUDS)
     done = sph_("restart", home / "run" / "checkpoints" / "checkpoint_000001.h5")
     assert done.exit_code == FileError.exit_code
     messages.check(done.stderr)

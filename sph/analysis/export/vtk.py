@@ -13,10 +13,17 @@ import numpy as np
 from sph.analysis.export import fields
 from sph.output.checkpoint import Checkpoint
 from sph.output.files import replacing
+from sph.state import Public
 
 VERSION = (2, 0)
 VERTEX = 1  # VTK's number of this type of cell
 CHUNK = 16384  # rows of a chunk
+# what has a unit besides the arrays
+OTHERS = {"Points": Public("", 1, 0, 0, 0, ""), "time": Public("", 0, 0, 1, 0, "")}
+UNIT = "unit of {}"  # name of the array of field data with the unit of an array, or of the time
+# the only strings that VTK reads: it ends with an error at others
+TEXT = h5py.string_dtype("ascii")
+ONE = np.array([[1, 1]])  # numbers of components and of tuples of a string
 COUNTS = ("NumberOfPoints", "NumberOfCells", "NumberOfConnectivityIds")
 OFFSETS = ("PointOffsets", "CellOffsets", "ConnectivityIdOffsets")
 
@@ -61,6 +68,25 @@ def _append_step(root: h5py.Group, steps: h5py.Group, checkpoint: Checkpoint, nu
         dataset.attrs["Description"] = one.public.description
         dataset.attrs["Unit"] = fields.unit_of(checkpoint.config, one.public)
         _append(offsets, one.name, np.array([before]))
+    _append_units(root, steps, checkpoint.config)
+
+
+def _append_units(root: h5py.Group, steps: h5py.Group, config) -> None:
+    """Append a step to the field data, which hold the same units in all steps.
+
+    ParaView and pyvista show field data, and no attributes of HDF5.
+    """
+    units = {name: dataset.attrs["Unit"] for name, dataset in root["PointData"].items()}
+    units |= {name: fields.unit_of(config, one) for name, one in OTHERS.items()}
+    data = root.require_group("FieldData")
+    places = [steps.require_group(f"FieldData{what}") for what in ("Offsets", "Sizes")]
+    for name, unit in units.items():
+        if not unit:  # a pure number
+            continue
+        if UNIT.format(name) not in data:
+            data.create_dataset(UNIT.format(name), data=[unit], dtype=TEXT)
+        for group, row in zip(places, (np.array([0]), ONE), strict=True):
+            _append(group, UNIT.format(name), row)
 
 
 def _append(group: h5py.Group, name: str, rows: np.ndarray) -> h5py.Dataset:

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 
-from sph.analysis.report.compare import COSTS, Report, Series
+from sph.analysis.report.compare import COSTS, DRIFT, Report, Series
 from sph.analysis.report.runs import Row
 
 # CPU times of equal runs differ by a few per cent, more on a shared machine.
@@ -33,6 +33,8 @@ def _costs(report: Report) -> str:
     text = f"Compared: {question.error_name}{against}, plotted against {COSTS[question.cost][0]}"
     if question.cost in ("cpu", "wall"):
         text += " without compilation and the start of Numba"
+    if question.field == DRIFT and not any(row.errors for row in report.rows):
+        text += ". No run has errors: --reference DIR takes them against a finer run"
     return text + "."
 
 

@@ -147,14 +147,34 @@ def check_inside(found: Contents, box: np.ndarray, boundaries: tuple[str, ...]) 
             first = int(np.argmax(outside))
             raise refusal(
                 found.path,
-                f"{found.names['position']} has {x[first]:.9g} along {'xyz'[axis]} for particle "
-                f"{first + 1}: {outside.sum()} particle(s) are outside the box",
-                f"{low:.9g} to {high:.9g}, because the boundary along {'xyz'[axis]} is {kind}",
+                f"{found.names['position']} has {x[first]:.9g}{_in_file(found, x[first])} along "
+                f"{'xyz'[axis]} for particle {first + 1}: {outside.sum()} particle(s) are outside "
+                "the box",
+                f"{low:.9g} to {high:.9g}{_in_run(found)}, because the boundary along "
+                f"{'xyz'[axis]} is {kind}",
                 'problem.domain = [lo, hi], or problem.boundary = "open"',
             )
         np.clip(x, low, high, out=x)
         if kind == "periodic":
             x[x == high] = low
+
+
+def _in_run(found: Contents) -> str:
+    """Return the run's unit of length in words, if the numbers of the file were converted to it."""
+    length = _lengths(found)
+    return f" in the unit of length of [units] ({length[1]:.6g} cm)" if length else ""
+
+
+def _in_file(found: Contents, x: float) -> str:
+    """Return the number that the file has in place of a converted position."""
+    length = _lengths(found)
+    return f" ({x * length[1] / length[0]:.9g} in the file)" if length else ""
+
+
+def _lengths(found: Contents) -> tuple[float, float] | None:
+    """Return the units of length of the file and of the run in cm; None without conversion."""
+    of_file, of_run = found.conversion or (None, None)
+    return (of_file[0], of_run[0]) if of_file and of_run and of_file != of_run else None
 
 
 def extent(position: np.ndarray) -> np.ndarray:

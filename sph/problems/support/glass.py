@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from sph import kernels
+from sph import kernels, stop_signals
 from sph.domain import Domain
 
 SWEEPS = 60  # most of repulsion: more reduce the scatter by little
@@ -61,7 +61,7 @@ def relaxed(
     volume: returns (N,) volumes of particles at positions (D, N). Boundaries are periodic or
     mirrors. told: called with the number of iterations and the scatter after each measurement.
     """
-    position = position.copy()
+    position, volume = position.copy(), _unless_ended(volume)
     last = Reached(position, np.inf, np.nan, 0)
     while last.iterations < min(SWEEPS, most):
         for _ in range(min(CHECK, most - last.iterations)):
@@ -76,6 +76,16 @@ def relaxed(
         if worse:  # volumes differ: repulsion does not settle where the filling is uniform
             break
     return _descended(last, domain, volume, smoothing, residual, most, told)
+
+
+def _unless_ended(volume: Callable[[np.ndarray], np.ndarray]):
+    """Return the function, which every iteration calls, with an end where a signal asks for one."""
+
+    def checked(position: np.ndarray) -> np.ndarray:
+        stop_signals.heed()
+        return volume(position)
+
+    return checked
 
 
 def measured(position, domain: Domain, volume, smoothing: Smoothing) -> Reached:

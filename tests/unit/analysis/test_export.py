@@ -20,10 +20,11 @@ from sph.state import State
 OF_GRID = {
     "NumberOfPoints", "NumberOfCells", "NumberOfConnectivityIds", "Points", "Connectivity",
     "Offsets", "Types", "PointData", "CellData", "Steps",
+    "FieldData",
 }  # fmt: skip
 OF_STEPS = {
     "Values", "PartOffsets", "NumberOfParts", "PointOffsets", "CellOffsets",
-    "ConnectivityIdOffsets", "PointDataOffsets",
+    "ConnectivityIdOffsets", "PointDataOffsets", "FieldDataOffsets", "FieldDataSizes",
 }  # fmt: skip
 
 
@@ -180,6 +181,9 @@ def test_exports_have_physical_units(tmp_path):
     assert {row[0]: row[1] for row in rows}["density"] == "M_sun pc^-3"
     with h5py.File(run.path / "export" / "particles_000000.vtkhdf") as file:
         assert file["VTKHDF/PointData/internal_energy"].attrs["Unit"] == "pc^2 Myr^-2"
+        told = {name: one.asstr()[:].tolist() for name, one in file["VTKHDF/FieldData"].items()}
+        assert told["unit of internal_energy"] == ["pc^2 Myr^-2"]
+        assert (told["unit of Points"], told["unit of time"]) == (["pc"], ["Myr"])
     # the numbers are those of the run
     found = read(run.path / "export" / "particles_000000.csv")
     particles = state.checkpoint.particles
@@ -213,6 +217,14 @@ def test_vtk_file_has_structure_of_its_specification(shear):
         data = root["PointData"]
         assert {*data} == {*steps["PointDataOffsets"]}
         assert all(len(data[name]) == 2 * n for name in data)
+        units = root["FieldData"]
+        assert {*units} == {*steps["FieldDataOffsets"]} == {*steps["FieldDataSizes"]}
+        for name, unit in units.items():
+            assert unit.shape == (1,), name
+            # VTK ends with an error at strings in UTF-8
+            assert h5py.check_string_dtype(unit.dtype).encoding == "ascii"
+            assert steps["FieldDataOffsets"][name][:].tolist() == [0, 0]
+            assert steps["FieldDataSizes"][name][:].tolist() == [[1, 1]] * 2
         last = states[1].particles
         order = np.argsort(last.id)
         assert np.array_equal(data["velocity"][n:, :2], last.velocity.T[order])

@@ -11,6 +11,7 @@ from click.testing import CliRunner
 from sph import config as configuration
 from sph.analysis import report as reports
 from sph.analysis.report import front, runs, table, words
+from sph.analysis.report.compare import DRIFT
 from sph.cli import main
 from sph.errors import ConfigError, FileError
 from sph.output.run_directory import RunDirectory
@@ -108,7 +109,9 @@ def test_runs_without_exact_solution_are_compared_by_energy_drift(tmp_path):
     for n in (100, 200):
         write_run(tmp_path / f"n={n}", None, 1.0, [f"problem.n={n}"])
     assert compared(tmp_path).error.tolist() == [2e-5, 2e-5]
+    assert "No run has errors: --reference DIR" in said(compared(tmp_path))
     write_run(tmp_path / "n=400", 0.25, 1.0, ["problem.n=400"])
+    assert "No run has errors" not in said(compared(tmp_path, field=DRIFT))
     assert compared(tmp_path).error.tolist() == [0.25]  # where a run has errors, these
 
 

@@ -28,8 +28,9 @@ ERRORS = {
     },
 }
 DONE = {
-    "status": "done", "problem": "uniform", "particles": 100, "time": 0.25, "steps": 20,
-    "warnings": [], "settings_changed": [], "errors": ERRORS, "errors_left_out": None,
+    "status": "done", "problem": "uniform", "dimension": 2, "particles": 100,
+    "time": 0.25, "steps": 20, "warnings": [], "settings_changed": [],
+    "errors": ERRORS, "errors_left_out": None,
     "report": {"peak_density": 4.5}, "conservation": KEPT, "cost": COST,
 }  # fmt: skip
 
@@ -61,6 +62,20 @@ def test_summary_text_names_injected_and_added_energy(messages):
         messages.check(kept(**{changed: 1.5e-5 if changed == "energy_injected" else None}))
 
 
+@pytest.mark.parametrize(
+    ("axes", "words"),
+    [(["x", "y"], "momentum to 3e-15"), (["y"], "momentum along y to 3e-15")],
+)
+def test_summary_text_names_axes_that_conserve_momentum(axes, words):
+    assert f"; {words};" in lines(momentum_along=axes)[3]
+
+
+@pytest.mark.parametrize("rate", [0, None])
+def test_summary_text_of_restart_without_steps_has_no_rate(rate):
+    session = COST["session"] | {"updates": 0, "updates_per_cpu_second": rate}
+    assert lines(cost=COST | {"session": session})[4].endswith(" 1.5 CPU s for compilation.")
+
+
 @pytest.mark.parametrize(("count", "words"), [(1, "1 warning)"), (2, "2 warnings)")])
 def test_summary_text_starts_with_warnings_and_changed_settings(count, words):
     told = [{"kind": "limit", "text": f"text {i}"} for i in range(count)]
@@ -89,8 +104,9 @@ def test_summary_text_names_reference_or_reason_without_errors():
 @pytest.fixture
 def summary_of(monkeypatch):
     """summary_of(status, reference): the summary of a simulation of which nothing is worked out."""
+    called = []
     for name in ("conservation", "cost"):
-        monkeypatch.setattr(summary, name, lambda *_, name=name: name)
+        monkeypatch.setattr(summary, name, lambda *_, name=name: called.append(name) or name)
     monkeypatch.setattr(summary.errors, "against_exact", lambda *_: "errors")
     monkeypatch.setattr(summary.truth, "left_out", lambda *_: "why not")
     monkeypatch.setattr(summary.truth, "figures", lambda *_: "figures")
@@ -107,12 +123,17 @@ def summary_of(monkeypatch):
         simulation = SimpleNamespace(
             scene=SimpleNamespace(
                 config=config, dimension=2, formulation=formulation,
-                described=lambda: (["i"], ["o"]),
+                described=lambda: (["i"], ["o"]), keeps_momentum=np.array([0.0, 1.0]),
             ),
             particles=particles, time=0.25, step=20, baseline=None,
-            nearest=lambda: np.array([0.9, 1.1, 0.2]),
+            nearest=lambda: called.append("nearest") or np.array([0.9, 1.1, 0.2]),
         )  # fmt: skip
-        return summary.of_run(simulation, {}, status, "a reason", lineage)
+        called.clear()
+        found = summary.of_run(simulation, {}, status, "a reason", lineage)
+        # the cost has what the search for the nearest compiles
+        assert called[-1] == "cost"
+        assert ("nearest" in called) == (status != "failed")
+        return found
 
     return made
 
@@ -130,7 +151,8 @@ def test_summary_finished_run_has_every_entry(summary_of):
         "lineage": list(lineage),
         "settings_changed": ["physics.alpha = 2.0 (was 1.0) at t = 0.125"],
         "errors": "errors", "errors_left_out": "why not", "report": "figures",
-        "conservation": "conservation", "nearest": {"median": 0.9, "smallest": 0.2},
+        "conservation": "conservation", "momentum_along": ["y"],
+        "nearest": {"median": 0.9, "smallest": 0.2},
         "tearing": {"bodies": 1, "pieces": 3}, "cost": "cost", "compiled_in": ["i"],
         "left_out": ["o"],
     }  # fmt: skip

@@ -66,6 +66,14 @@ def test_stated_units_are_converted_to_those_of_the_run(tmp_path, dimension):
     assert again.problem.remarks() == found.problem.remarks()
 
 
+def test_position_outside_the_box_is_told_in_both_units(messages, tmp_path):
+    state = ic_files.particles()
+    state["position"][3, 1] = 1.5  # of a box of 1 in the file, 2 in the run
+    path = written(tmp_path / "ic.hdf5", state, Units=SWIFT)
+    with messages.raised(FileError, " 3 (1.5 in the file)", "0 to 2 in the unit", "3e+18 cm"):
+        made(path, RUN)
+
+
 @pytest.mark.parametrize("group", ["Header", "Parameters"])
 @pytest.mark.parametrize(
     "names",
