@@ -71,12 +71,16 @@ def of_criterion(formulation: str, name: str) -> str | None:
 
 def criteria() -> dict[str, str]:
     """Return what each criterion means, those of parts after those of every run."""
+    formulations = registry.names(FORMULATIONS, folders=True)  # have no criterion of their own
     limiting = [
         kind
-        for name in registry.names(FORMULATIONS, folders=True)
+        for name in formulations
         for kind in parts.classes(name)
-        if kind.largest_courant is not Part.largest_courant
-        or kind.step_limit is not Part.step_limit
+        if kind.name not in formulations
+        and (
+            kind.largest_courant is not Part.largest_courant
+            or kind.step_limit is not Part.step_limit
+        )
     ]
     names = (*CRITERIA, "checkpoint", *(kind.name for kind in limiting))
     return {name: str(of_criterion(DEFAULT, name)) for name in names}

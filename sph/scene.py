@@ -146,7 +146,7 @@ class Scene:
         """The limits on the time step that the configuration determines."""
         physics = self.physics
         held, criterion = physics.C, "signal_speed"
-        for part in self.parts:
+        for part in self.all_parts:
             most, by = part.largest_courant()
             if most < held:
                 held, criterion = most, by

@@ -179,21 +179,27 @@ def _kept_positive(energy, change):
 
 @njit(**ROUNDED)
 def _density_predict(first, last, dt, density, rate, mass, density_full) -> float:
-    """Advance `density` by half a step; write the full step to density_full. Both stay positive."""
+    """Write the density after a full step with the last rate to density_full."""
     for d in range(density.shape[0]):
         for i in range(first, last):
-            start = density[d, i]
-            density_full[d, i], _ = _kept_positive(start, rate[d, i] * dt)
-            density[d, i], _ = _kept_positive(start, 0.5 * rate[d, i] * dt)
+            density_full[d, i] = stepped_density(density[d, i], rate[d, i] * dt)
     return 0.0
 
 
 @njit(**ROUNDED)
 def _density_correct(first, last, dt, density, rate, mass) -> float:
+    """Advance the density by a full step with the rate in its middle."""
     for d in range(density.shape[0]):
         for i in range(first, last):
-            density[d, i], _ = _kept_positive(density[d, i], 0.5 * rate[d, i] * dt)
+            density[d, i] = stepped_density(density[d, i], rate[d, i] * dt)
     return 0.0
+
+
+@njit(**INLINED)
+def stepped_density(density, change):
+    """Return rho + change, kept positive."""
+    found, _ = _kept_positive(density, change)
+    return found
 
 
 # --- individual time steps ---

@@ -38,7 +38,7 @@ class Problem(base.Problem):
         "output.interval": 3.141592653589793e-3,
     }
     limits: ClassVar = {
-        "energy_drift": base.Limit(1e-6, "measured: 4e-9, errors of the time step"),
+        "energy_drift": base.Limit(1e-6, "measured: 1.1e-8, errors of the time step"),
         "angular_momentum_drift": base.Limit(
             1e-6, "measured: 4e-8 a turn; stress has no torque at order 1"
         ),

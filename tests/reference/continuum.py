@@ -11,7 +11,6 @@ from typing import NamedTuple
 
 import dense
 import numpy as np
-from scipy.linalg import expm
 
 WORST_CONDITION = 1e6  # of the matrix of order 1, beyond which a particle takes order 0
 
@@ -214,23 +213,35 @@ def flow(scene, pairs, slopes, matter, volume, lengths):
     L = -pairs.sum(V_j * v_ij[:, None] * slopes.own[None, :], n)
     scale = pairs.sum(V_j * norm(v_ij) * slopes.own_scale, n)
     divergence = np.trace(L)
-    curl = np.sqrt(2) * norm(spin(L))
+    curl = curl_of(L)
     curl_scale = 2 * scale * (d > 1)
     divergence_scale = d * scale
-    floor = 1e-4 * matter.sound_speed / lengths
-    sum_ = abs(divergence) + curl + floor
+    sum_ = abs(divergence) + curl + 1e-4 * matter.sound_speed / lengths
     return {
         "velocity_gradient": L,
         "divergence": divergence,
         "curl": curl,
         "density_rate": -matter.density * divergence,
-        "balsara": abs(divergence) / sum_ if scene.balsara else np.ones(n),
+        "balsara": switch(scene, L, matter.sound_speed, lengths),
         "velocity_gradient_scale": scale,
         "divergence_scale": divergence_scale,
         "curl_scale": curl_scale,
         "density_rate_scale": matter.density * divergence_scale,
         "balsara_scale": 1 + (divergence_scale + curl_scale) / sum_ * scene.balsara,
     }
+
+
+def curl_of(velocity_gradient):
+    """(N,) the modulus of the curl."""
+    return np.sqrt(2) * norm(spin(velocity_gradient))
+
+
+def switch(scene, L, sound_speed, lengths):
+    """(N,) f of eq 410."""
+    if not scene.balsara:
+        return np.ones_like(lengths)
+    compression = abs(np.trace(L))
+    return compression / (compression + curl_of(L) + 1e-4 * sound_speed / lengths)
 
 
 def strain_rate(velocity_gradient):
@@ -342,14 +353,16 @@ def velocity_gradient(scene: Scene, matter: Matter) -> np.ndarray:
     return flow(scene, pairs, slopes, matter, volume, lengths)["velocity_gradient"]
 
 
-def rates(scene: Scene, matter: Matter) -> Rates:
-    """Every rate of the scheme at the state of the particles."""
+def rates(scene: Scene, matter: Matter, factor: np.ndarray | None = None) -> Rates:
+    """Every rate of the scheme at the state of the particles; `factor` (N,) in place of f."""
     volume = matter.mass / matter.density
     lengths = scene.lengths(matter.mass, matter.density)
     pairs = pairs_of(scene, matter.position, 2 * lengths)
     by = correction_of(scene, pairs, volume)
     slopes = gradients_of(scene, pairs, by)
     state = flow(scene, pairs, slopes, matter, volume, lengths)
+    if factor is not None:
+        state["balsara"] = factor
     state |= forces(scene, pairs, slopes, matter, volume, state)
     return Rates(
         normalisation=by.normalisation,
@@ -364,8 +377,8 @@ def rates(scene: Scene, matter: Matter) -> Rates:
 
 
 def time_step(scene: Scene, matter: Matter, now: Rates) -> float:
-    """0.3 d/(Q + sqrt(Q^2 + c^2)), the smallest of all particles."""
-    return (0.6 * scene.lengths(matter.mass, matter.density) / now.signal_speed).min()
+    """0.6 d/(Q + sqrt(Q^2 + c^2)), the smallest of all particles: C = 0.3."""
+    return (1.2 * scene.lengths(matter.mass, matter.density) / now.signal_speed).min()
 
 
 # --- the step ---
@@ -401,53 +414,76 @@ class Body:
     rest_density: np.ndarray
     rates: Rates | None = None
     shear_modulus: np.ndarray | None = None
+    density_rate: np.ndarray | None = None  # the mean over the last step
 
-    def evaluate(self, velocity, density, energy, deviator):
-        """Rates at the present position and the predicted values."""
-        at_rest = np.zeros_like(deviator), np.ones_like(density)
-        matter = Matter(self.position, velocity, self.mass, density, *at_rest, self.rest_density)
-        rate = equivalent_rate(velocity_gradient(self.scene, matter))
-        now = self.law(density, energy, deviator, rate, self.plastic_strain)
+    def evaluate(self, velocity, volume_density, density, energy, deviator, L):
+        """Rates at the present position and the predicted values.
+
+        Volumes and supports are those of `volume_density`, pressure that of `density`. L is the
+        velocity gradient in the middle of the step.
+        """
+        now = self.law(density, energy, deviator, equivalent_rate(L), self.plastic_strain)
         stress = now.deviator - now.pressure * np.eye(len(velocity))[:, :, None]
-        matter = matter._replace(stress=stress, sound_speed=now.sound_speed)
-        self.rates, self.shear_modulus = rates(self.scene, matter), now.shear_modulus
+        matter = Matter(self.position, velocity, self.mass, volume_density, stress,
+                        now.sound_speed, self.rest_density)  # fmt: skip
+        lengths = self.scene.lengths(self.mass, volume_density)
+        self.rates = rates(self.scene, matter, switch(self.scene, L, now.sound_speed, lengths))
+        self.shear_modulus = now.shear_modulus
+        return now
+
+    def gradient(self, velocity, density):
+        """L at the present position, with volumes of `density`."""
+        at_rest = np.zeros_like(self.deviator), np.ones_like(density)
+        return velocity_gradient(
+            self.scene, Matter(self.position, velocity, self.mass, density, *at_rest)
+        )
 
     def start(self):
-        """The rates at t = 0."""
-        self.evaluate(self.velocity, self.density, self.energy, self.deviator)
+        """The rates at t = 0, after the stress has returned to the yield surface."""
+        L = self.gradient(self.velocity, self.density)
+        now = self.evaluate(
+            self.velocity, self.density, self.density, self.energy, self.deviator, L
+        )
+        self.deviator = now.deviator
+        self.plastic_strain = self.plastic_strain + now.plastic_strain
+        self.density_rate = -self.density * np.trace(L)
 
     def advance(self, dt):
-        """One step: prediction, rates, correction (eqs 1-6 and 29-31 for every quantity).
+        """One step: positions, the middle of the step, forces at its end (eqs 1-6 and 29-31).
 
-        S changes by Hooke's law in half steps, between which the rotation of half a step turns it.
+        Density and stress change by the velocity gradient in the middle of the step.
         """
         half, old = 0.5 * dt, self.rates
         self.position = self.position + self.velocity * dt + 0.5 * old.acceleration * dt**2
-        change = half * deviatoric_rate(old.velocity_gradient, self.shear_modulus)
-        self.deviator = turned(self.deviator + change, old.velocity_gradient, half)
-        predicted = (
-            self.velocity + old.acceleration * dt,
-            self.density + old.density_rate * dt,
-            self.energy + old.energy_rate * dt,
-            turned(self.deviator, old.velocity_gradient, half) + change,
-        )
-        self.velocity = self.velocity + old.acceleration * half
-        self.density = self.density + old.density_rate * half
-        self.energy = self.energy + old.energy_rate * half
-        self.evaluate(*predicted)
-        new = self.rates
-        self.velocity = self.velocity + new.acceleration * half
-        self.density = self.density + new.density_rate * half
-        self.energy = self.energy + new.energy_rate * half
-        change = half * deviatoric_rate(new.velocity_gradient, self.shear_modulus)
-        trial = turned(self.deviator, new.velocity_gradient, half) + change
-        rate = equivalent_rate(new.velocity_gradient)
-        now = self.law(self.density, self.energy, trial, rate, self.plastic_strain)
+        middle = self.velocity + old.acceleration * half
+        volume_density = self.density + self.density_rate * dt
+        L = centred(self.gradient(middle, volume_density), dt)
+        grown = self.density * np.exp(-np.trace(L) * dt)
+        self.density_rate = (grown - self.density) / dt
+        self.density = grown
+        change = half * deviatoric_rate(L, self.shear_modulus)
+        trial = turned(self.deviator + change, L, dt) + change
+        energy = self.energy + old.energy_rate * dt
+        predicted = self.velocity + old.acceleration * dt
+        now = self.evaluate(predicted, volume_density, grown, energy, trial, L)
         self.deviator = now.deviator
         self.plastic_strain = self.plastic_strain + now.plastic_strain
+        self.velocity = middle + self.rates.acceleration * half
+        self.energy = self.energy + (old.energy_rate + self.rates.energy_rate) * half
 
 
-def turned(tensor, velocity_gradient, time):
-    """(D, D, N) the tensor turned with the spin for a time."""
-    turn = expm(time * spin(velocity_gradient).transpose(2, 0, 1))
+def centred(L, dt):
+    """(D, D, N) the velocity gradient with respect to positions half a step before.
+
+    Positions then are x - v dt/2, so the deformation since is (I - L dt/2)^-1.
+    """
+    back = np.eye(len(L)) - 0.5 * dt * L.transpose(2, 0, 1)
+    return (L.transpose(2, 0, 1) @ np.linalg.inv(back)).transpose(1, 2, 0)
+
+
+def turned(tensor, velocity_gradient, dt):
+    """(D, D, N) the tensor turned by a step: (I - A)^-1 (I + A), A = W dt/2 (Hughes & Winget)."""
+    A = 0.5 * dt * spin(velocity_gradient).transpose(2, 0, 1)
+    unit = np.eye(len(tensor))
+    turn = np.linalg.solve(unit - A, unit + A)
     return np.einsum("nac,cdn,nbd->abn", turn, tensor, turn)

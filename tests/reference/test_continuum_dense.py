@@ -277,7 +277,7 @@ def test_two_particles_match_by_hand(order):
     np.testing.assert_allclose(found.energy_rate, work / m, rtol=1e-13)
     Q = c - 2.0 * mu_0
     np.testing.assert_allclose(found.signal_speed, 2 * (Q + np.sqrt(Q**2 + c**2)), rtol=1e-14)
-    step = 0.3 * d / (Q + np.sqrt(Q**2 + c**2))
+    step = 0.6 * d / (Q + np.sqrt(Q**2 + c**2))
     assert continuum.time_step(scene, matter, found) == pytest.approx(step.min(), rel=1e-14)
 
 
@@ -384,23 +384,29 @@ def total_energy(body):
     return (body.mass * (0.5 * (body.velocity**2).sum(axis=0) + body.energy)).sum()
 
 
-@pytest.mark.parametrize("dimension", [1, 2])
+@pytest.mark.parametrize("dimension", DIMENSIONS)
 def test_step_is_of_second_order(dimension):
-    """Errors of position, velocity, stress and energy fall fourfold with half the step."""
+    """Errors fall fourfold with half the step, where the velocity gradient is exact.
+
+    It is at order 1 for a linear field. Otherwise the error of a gradient in space, as particles
+    move by half a step, leaves one of order one in time.
+    """
     ends = {}
     for steps in (4, 8, 16):
         body = elastic_body(dimension)
+        shear = np.random.default_rng(3).normal(size=(dimension, dimension))
+        body.velocity = 0.6 * shear @ (body.position - 0.5)
+        body.start()
         before = total_energy(body)
         for _ in range(steps):
             body.advance(0.04 / steps)
-        ends[steps] = np.concatenate([
-            body.position.ravel(), body.velocity.ravel(), body.density, body.energy,
-            body.deviator.ravel(), [total_energy(body) - before],
-        ])  # fmt: skip
-    coarse, fine = abs(ends[4] - ends[8]).max(), abs(ends[8] - ends[16]).max()
-    # 3: of the fourfold fall of order two; order one would give 2
-    assert coarse > 3 * fine
-    assert abs(ends[16][-1]) < abs(ends[4][-1]) / 8
+        ends[steps] = (
+            body.position, body.velocity, body.density, body.energy, body.deviator,
+            np.array(total_energy(body) - before),
+        )  # fmt: skip
+    for coarse, middle, fine in zip(*ends.values(), strict=True):
+        # 3.5: of the fourfold fall of order two; order one would give 2
+        assert abs(coarse - middle).max() > 3.5 * abs(middle - fine).max()
 
 
 def test_equivalent_rate_of_simple_shear_and_uniaxial_strain():
@@ -417,10 +423,9 @@ def test_equivalent_rate_of_simple_shear_and_uniaxial_strain():
 def test_turned_keeps_principal_values_and_follows_the_body():
     spin = np.array([[0.0, -2.0], [2.0, 0.0]])[:, :, None]
     tensor = np.diag([3.0, -1.0])[:, :, None]
-    # a quarter turn exchanges the axes
-    np.testing.assert_allclose(
-        continuum.turned(tensor, spin, np.pi / 4)[..., 0], np.diag([-1.0, 3.0]), atol=1e-15
-    )
-    eighth = continuum.turned(tensor, spin, np.pi / 8)[..., 0]
+    # a quarter turn, whose half has the tangent 1, exchanges the axes
+    quarter = continuum.turned(tensor, spin, 1.0)[..., 0]
+    np.testing.assert_allclose(quarter, np.diag([-1.0, 3.0]), atol=1e-15)
+    eighth = continuum.turned(tensor, spin, np.tan(np.pi / 8))[..., 0]
     # counter-clockwise: the pulled axis points to the first quadrant
     np.testing.assert_allclose(eighth, [[1.0, 2.0], [2.0, 1.0]], atol=1e-15)

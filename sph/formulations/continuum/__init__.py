@@ -16,6 +16,12 @@ STRENGTH = "sph.formulations.continuum.strength"
 # Support radius over the smoothing length d of the equations.
 SUPPORT_RATIO = 2.0
 
+# Largest stable Courant number. Viscosity damps differences between neighbours at a rate of up to
+# 2.6 Q/d (all pairs of a line of particles approaching, spacing ratio 1.5; less in 2-D and 3-D, and
+# at 1.2), and a step is C d/Q where viscosity rules: 2.6 C < 1 (see `integrators.step_size`). Where
+# it does not, waves have w < 1.1 c/d, which the leapfrog bears up to C = 0.9.
+LARGEST_COURANT = 0.38
+
 CORRECTIONS = {
     "corrections_failed": Quantity("number of particles at which correction 1 fell back to 0")
 }
@@ -36,7 +42,7 @@ class ContinuumModels(NamedTuple):
 class Continuum(Formulation):
     """Continuity, kernel correction, constitutive laws and rates."""
 
-    defaults = {"kernel": "cubic_spline", "energy_limit": False}  # noqa: RUF012
+    defaults = {"kernel": "cubic_spline", "energy_limit": False, "C": 0.3}  # noqa: RUF012
     neighbours_key = "physics.spacing_ratio"
     keys = (
         Key(
@@ -91,7 +97,7 @@ class Continuum(Formulation):
         ),
     )  # fmt: skip
     reserves = (
-        "pressure", "stress", "deviatoric_stress", "stress_rate", "predicted_stress",
+        "pressure", "stress", "deviatoric_stress",
         "plastic_strain", "material", "clamped", "balsara", "kernel_factor", "kernel_gradient",
         "kernel_matrix", "tension", "initial_support", "body",
     )  # fmt: skip
@@ -149,6 +155,9 @@ class Continuum(Formulation):
                 text = "expected it in the tables of physics.materials, which are given"
                 found.append((key, text))
         return found
+
+    def largest_courant(self):
+        return LARGEST_COURANT, "signal_speed"
 
     # --- state ---
 

@@ -1,7 +1,6 @@
 """Fields of the continuum formulation, and their integration in time."""
 
 from sph.formulations.continuum import pieces
-from sph.formulations.continuum.rotation import JAUMANN
 from sph.integrators.leapfrog import DENSITY, STRAIGHT
 from sph.part import Evolved
 from sph.state import COMMON, Field, Public
@@ -45,8 +44,7 @@ def of(scheme) -> tuple[Field, ...]:
     if not scheme.is_solid:
         return (*found, Field("pressure", stored=False))
     # no public name: the stress tensor and the pressure tell it, in all three directions
-    found += [Field("deviatoric_stress", rank=2), Field("stress_rate", rank=2), pieces.BODY]
-    found += [Field("predicted_stress", rank=2, stored=False)]
+    found += [Field("deviatoric_stress", rank=2), pieces.BODY]
     found += [Field("stress", rank=2, stored=False)]
     found += [PLASTIC_STRAIN] * scheme.yields
     if scheme.corrects_tension:
@@ -57,10 +55,7 @@ def of(scheme) -> tuple[Field, ...]:
 
 def evolved(scheme) -> tuple[Evolved, ...]:
     """Return the quantities that are integrated in time."""
-    found = (
+    return (
         Evolved("internal_energy", "energy_rate", "predicted_energy", STRAIGHT),
         Evolved("density", "density_rate", "predicted_density", DENSITY),
     )
-    if not scheme.is_solid:
-        return found
-    return *found, Evolved("deviatoric_stress", "stress_rate", "predicted_stress", JAUMANN)

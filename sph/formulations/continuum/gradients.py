@@ -45,6 +45,9 @@ from sph.simd import (
     zeros,
 )
 
+# Ratio of volumes half a step ago and now below which eq 416 is not used.
+LEAST_VOLUME = 0.1
+
 # Condition number of M above which order 1 falls back to order 0; relative to the identity, M is
 # zero below the inverse of this number.
 SINGULAR = 1e6
@@ -52,15 +55,17 @@ SINGULAR = 1e6
 
 @njit(**COMPILED)
 def gradients(
-    first, last, dim, models, neighbours, position, velocity, mass, density, support,
-    kernel_factor, kernel_gradient, kernel_matrix, velocity_gradient, div_v, density_rate,
+    first, last, dim, models, neighbours, position, velocity, mass, density, support, before,
+    kernel_factor, kernel_gradient, kernel_matrix, velocity_gradient, div_v, density_rate, dt,
 ):  # fmt: skip
-    """Gradient pass over superblocks [first, last): eqs 402-407.
+    """Gradient pass over superblocks [first, last): eqs 402-407 and 416.
 
-    Reads the predicted velocity (D, N) and density (N,). Writes velocity_gradient (D, D, N), div_v
-    (N,), density_rate (N,) and the correction of the kernel, of which the arrays are None that its
-    order does not need: order 0 has kernel_factor (N,) and kernel_gradient (D, N), order 1 has
-    kernel_matrix (D, D, N) and kernel_gradient, which is not zero where it falls back to order 0.
+    Reads the velocity (D, N) in the middle of the step of length dt, the predicted density (N,) and
+    the density (N,) `before` the step. Writes velocity_gradient (D, D, N), div_v (N,) and
+    density_rate (N,) in the middle of the step, and the correction of the kernel, of which the
+    arrays are None that its order does not need: order 0 has kernel_factor (N,) and kernel_gradient
+    (D, N), order 1 has kernel_matrix (D, D, N) and kernel_gradient, which is not zero where it
+    falls back to order 0.
     """
     D, lanes, lists = len(dim), neighbours.lanes, neighbours.lists
     kernel, sym, full = models.kernel, symmetric_dim(dim), full_dim(dim)
@@ -141,13 +146,15 @@ def gradients(
                             for b in range(D):
                                 identity = alpha if a == b else 0.0
                                 kernel_matrix[a, b, i] = B[a, b] if is_regular else identity
+                _centred(L, B, M, 0.5 * dt / per_rate)
                 divergence = 0.0
                 for a in range(D):
-                    divergence += L[a, a]
+                    divergence += M[a, a] / per_rate
                     for b in range(D):
-                        velocity_gradient[a, b, i] = L[a, b] / per_rate
-                div_v[i] = divergence / per_rate
-                density_rate[i] = -density[i] * (divergence / per_rate)  # eq 407
+                        velocity_gradient[a, b, i] = M[a, b] / per_rate
+                div_v[i] = divergence
+                growth = np.expm1(-divergence * dt) / dt if dt > 0.0 else -divergence
+                density_rate[i] = before[i] * growth  # eq 407
 
 
 # --- small matrices (D, D) ---
@@ -197,6 +204,44 @@ def _corrected(M, alpha, mixed, grad_alpha, L):
     for a in range(D):
         for b in range(D):
             L[a, b] = -alpha * M[a, b] - mixed[a] * grad_alpha[b]
+
+
+@njit(**INLINED)
+def _centred(L, B, M, half):
+    """Set M to L (I - half L)^-1, eq 416; B is overwritten.
+
+    M is L where half a step backwards would turn the matter inside out, or nearly so.
+    """
+    D = L.shape[0]
+    for a in range(D):
+        for b in range(D):
+            B[a, b] = (1.0 if a == b else 0.0) - half * L[a, b]
+    if D == 1:
+        determinant = B[0, 0]
+        inverse = (1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    elif D == 2:
+        determinant = B[0, 0] * B[1, 1] - B[0, 1] * B[1, 0]
+        inverse = (B[1, 1], -B[0, 1], -B[1, 0], B[0, 0], 0.0, 0.0, 0.0, 0.0, 0.0)
+    else:
+        inverse = (
+            B[1, 1] * B[2, 2] - B[1, 2] * B[2, 1],
+            B[0, 2] * B[2, 1] - B[0, 1] * B[2, 2],
+            B[0, 1] * B[1, 2] - B[0, 2] * B[1, 1],
+            B[1, 2] * B[2, 0] - B[1, 0] * B[2, 2],
+            B[0, 0] * B[2, 2] - B[0, 2] * B[2, 0],
+            B[0, 2] * B[1, 0] - B[0, 0] * B[1, 2],
+            B[1, 0] * B[2, 1] - B[1, 1] * B[2, 0],
+            B[0, 1] * B[2, 0] - B[0, 0] * B[2, 1],
+            B[0, 0] * B[1, 1] - B[0, 1] * B[1, 0],
+        )
+        determinant = B[0, 0] * inverse[0] + B[0, 1] * inverse[3] + B[0, 2] * inverse[6]
+    is_regular = determinant > LEAST_VOLUME
+    for a in range(D):
+        for b in range(D):
+            total = 0.0
+            for c in range(D):
+                total += L[a, c] * inverse[c * D + b]
+            M[a, b] = total / determinant if is_regular else L[a, b]
 
 
 @njit(**INLINED)

@@ -14,7 +14,9 @@ from sph.compiled import COMPILED, INLINED
 from sph.eos import pressure as pressure_of
 from sph.eos import sound_speed as sound_speed_of
 from sph.formulations.continuum.radial_return import equivalent_stress, returned
+from sph.formulations.continuum.rotation import advance
 from sph.formulations.continuum.tension import tensile
+from sph.integrators.leapfrog import stepped_density
 from sph.neighbours.order import BLOCK
 
 # Softening of the viscosity's switch, in units of c/d (eq 410).
@@ -41,17 +43,17 @@ class Material(NamedTuple):
 
 @njit(**COMPILED)
 def stresses(
-    first, last, dim, models, neighbours, density, energy, support, velocity_gradient, div_v,
-    number, plastic_strain, predicted_stress, pressure, stress, sound_speed, balsara, stress_rate,
-    tension,
+    first, last, dim, models, neighbours, density, density_rate, energy, support, velocity_gradient,
+    div_v, number, deviatoric_stress, plastic_strain, pressure, stress, sound_speed, balsara,
+    tension, dt,
 ):  # fmt: skip
-    """Pass over superblocks [first, last): eqs 410, 415 and those of the material's laws.
+    """Pass over superblocks [first, last): eqs 410, 415, 430-435 and those of the material's laws.
 
-    Reads the predicted density and energy (N,), support (N,), velocity_gradient (D, D, N), div_v
-    (N,), number (N,) of each particle's material and plastic_strain (N,). Moves predicted_stress
-    (D, D, N) to the yield surface. Writes pressure (N,) where the scene has no strength, otherwise
-    stress, stress_rate (D, D, N); sound_speed, balsara (N,); tension (D, D, N). An array is None if
-    the scene does not need it.
+    Reads the density (N,) at the start of the step and its rate in the middle, the predicted energy
+    (N,), support (N,), velocity_gradient (D, D, N) and div_v (N,) in the middle, and number (N,) of
+    each particle's material. Advances deviatoric_stress (D, D, N) and plastic_strain (N,) by the
+    step dt. Writes pressure (N,) where the scene has no strength, otherwise stress (D, D, N);
+    sound_speed, balsara (N,); tension (D, D, N). An array is None if the scene does not need it.
     """
     D, lists, eos, strength = len(dim), neighbours.lists, models.eos, models.strength
     i_end = min(lists.first[last] * BLOCK, density.size)
@@ -59,7 +61,7 @@ def stresses(
     for i in range(np.uint64(lists.first[first] * BLOCK), np.uint64(i_end)):
         if number is not None and number[i] != models.number:
             continue
-        rho, u = density[i], energy[i]
+        rho, u = stepped_density(density[i], density_rate[i] * dt), energy[i]
         P = pressure_of(eos, rho, u)
         c = sound_speed_of(eos, rho, P)
         G = shear_modulus(strength)
@@ -74,41 +76,16 @@ def stresses(
         if pressure is not None:
             pressure[i] = P
         if stress is not None:
+            if G > 0.0:
+                advance(dim, deviatoric_stress, velocity_gradient, div_v, 2.0 * G, dt, i)
             _return(
-                strength, dim, predicted_stress, velocity_gradient, div_v, plastic_strain, u, i,
-                False,
-            )  # fmt: skip
+                strength, dim, deviatoric_stress, velocity_gradient, div_v, plastic_strain, u, i
+            )
             for a in range(D):
                 for b in range(D):
-                    stress[a, b, i] = predicted_stress[a, b, i] - (P if a == b else 0.0)
-                    # Hooke's law and, in the antisymmetric part, the spin: `rotation`
-                    L_ab, L_ba = velocity_gradient[a, b, i], velocity_gradient[b, a, i]
-                    trace = div_v[i] / 3.0 if a == b else 0.0
-                    stress_rate[a, b, i] = 2.0 * G * (0.5 * (L_ab + L_ba) - trace) + 0.5 * (
-                        L_ab - L_ba
-                    )
+                    stress[a, b, i] = deviatoric_stress[a, b, i] - (P if a == b else 0.0)
             if tension is not None:
                 tensile(dim, models.tensile_correction, stress, i, axes, tension)
-
-
-@njit(**COMPILED)
-def yielded(
-    first, last, dim, models, neighbours, energy, velocity_gradient, div_v, number, stress,
-    plastic_strain,
-):  # fmt: skip
-    """Move the corrected deviatoric stress (D, D, N) to the yield surface (eqs 434-435).
-
-    For superblocks [first, last). Adds to plastic_strain (N,).
-    """
-    lists = neighbours.lists
-    i_end = min(lists.first[last] * BLOCK, energy.size)
-    for i in range(np.uint64(lists.first[first] * BLOCK), np.uint64(i_end)):
-        if number is not None and number[i] != models.number:
-            continue
-        _return(
-            models.strength, dim, stress, velocity_gradient, div_v, plastic_strain, energy[i], i,
-            True,
-        )  # fmt: skip
 
 
 def shear_modulus(strength):
@@ -122,24 +99,23 @@ def _shear_modulus(strength):
     return lambda strength: strength.shear_modulus
 
 
-def _return(strength, dim, S, velocity_gradient, div_v, plastic_strain, u, i, is_final):
-    """Move S (D, D, N) of particle i to the yield surface; add its plastic strain if `is_final`."""
+def _return(strength, dim, S, velocity_gradient, div_v, plastic_strain, u, i):
+    """Move S (D, D, N) of particle i to the yield surface (eqs 434-435); add its plastic strain."""
 
 
 @overload(_return, jit_options=INLINED)  # type: ignore[arg-type]
-def _radial_return(strength, dim, S, velocity_gradient, div_v, plastic_strain, u, i, is_final):
-    def nothing(strength, dim, S, velocity_gradient, div_v, plastic_strain, u, i, is_final):
+def _radial_return(strength, dim, S, velocity_gradient, div_v, plastic_strain, u, i):
+    def nothing(strength, dim, S, velocity_gradient, div_v, plastic_strain, u, i):
         return
 
-    def by_radius(strength, dim, S, velocity_gradient, div_v, plastic_strain, u, i, is_final):
+    def by_radius(strength, dim, S, velocity_gradient, div_v, plastic_strain, u, i):
         rate = _strain_rate(dim, velocity_gradient, div_v[i], i)
         size = equivalent_stress(dim, S, i)
         factor, more = returned(strength, size, plastic_strain[i], rate, u)
         for a in range(len(dim)):
             for b in range(len(dim)):
                 S[a, b, i] *= factor
-        if is_final:
-            plastic_strain[i] += more
+        plastic_strain[i] += more
 
     return by_radius if not _is_none(strength) and strength.instance_class.yields else nothing
 

@@ -131,14 +131,3 @@ def _tractions_of_candidates(lanes, dim, sym, pressure, stress, near, p_row, s_r
         return symmetric_times(load_spatial(lanes, sym, near, s_row, k), a)
 
     return of_stress if _is_there(stress) else of_pressure
-
-
-def component(pressure, stress, a, b, i):
-    """Return sigma_ab of particle i."""
-
-
-@overload(component, jit_options=INLINED)  # type: ignore[arg-type]
-def _stress_component(pressure, stress, a, b, i):
-    if _is_there(stress):
-        return lambda pressure, stress, a, b, i: stress[a, b, i]
-    return lambda pressure, stress, a, b, i: -pressure[i] if a == b else 0.0

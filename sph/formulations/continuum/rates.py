@@ -14,7 +14,6 @@ from sph.formulations.continuum.matter import (
     power,
 )
 from sph.formulations.continuum.pair_terms import (
-    component,
     copy_gradients,
     corrected_gradient,
     corrected_gradient_of,
@@ -66,7 +65,7 @@ RHO, C_S = NEXT, NEXT + 1
 def rates(
     first, last, dim, models, neighbours, position, velocity, mass, density, support, sound_speed,
     balsara, pressure, stress, kernel_factor, kernel_gradient, kernel_matrix, tension,
-    initial_support, velocity_gradient, acceleration, energy_rate, signal_speed,
+    initial_support, acceleration, energy_rate, signal_speed,
 ):  # fmt: skip
     """Rate pass over superblocks [first, last): eqs 408-413.
 
@@ -166,12 +165,14 @@ def rates(
                         kernel_gradient, kernel_matrix, factor_row, gradient_row, matrix_row,
                     )  # fmt: skip
                     # eq 408
+                    own_pull = traction(dim, pressure, stress, i, grad_i, per_stress)
                     pull = minus(
-                        traction(dim, pressure, stress, i, grad_i, per_stress),
+                        own_pull,
                         traction_of(
                             lanes, dim, sym, pressure, stress, near, p_row, s_row, k, grad_j
                         ),
                     )
+                    gained -= V_j * rho_inv_i * dot(v_ij, own_pull)  # eq 411
                     # eqs 409-410
                     squared = dot(r_ij, r_ij)
                     h_ij = 0.5 / H_inv
@@ -204,11 +205,7 @@ def rates(
                     acceleration, i,
                     times(lane_sums(total), per_length / (per_velocity * per_velocity)),
                 )  # fmt: skip
-                work = 0.0  # sigma : L / rho
-                for a in range(D):
-                    for b in range(D):
-                        work += component(pressure, stress, a, b, i) * velocity_gradient[a, b, i]
-                energy_rate[i] = work / density[i] + lane_sum(gained) * (
+                energy_rate[i] = lane_sum(gained) * (
                     per_length / (per_velocity * per_velocity * per_velocity)
                 )
                 c_i = sound_speed[i]

@@ -1,78 +1,52 @@
-"""Integration of the deviatoric stress, with the exact rotation of a step (eqs 430-431).
+"""Integration of the deviatoric stress, with the rotation of a step (eqs 430-431).
 
-The rate of the stress (D, D) holds two things: its symmetric part is the rate by Hooke's law, and
-its antisymmetric part the spin of the material, (L - L^T)/2 with L the velocity gradient. The usual
-Jaumann rate, in which the spin enters as one more rate, changes |S| in a pure rotation; a rotation
-of the stress does not.
+The usual Jaumann rate, in which the spin enters as one more rate, changes |S| in a pure rotation; a
+rotation of the stress does not.
 """
 
-import numpy as np
 from numba import njit
 
-from sph.compiled import COMPILED, INLINED, larger
-from sph.integrators.leapfrog import STRAIGHT
-from sph.part import Rule
-
-# sin(x)/x is 1 to the last bit below this angle.
-SMALLEST_ANGLE = 1e-8
+from sph.compiled import INLINED
 
 
-@njit(**COMPILED)
-def predict_turned(first, last, dt, stress, rate, mass, predicted) -> float:
-    """Advance the stress by half a step; write the full step to `predicted`. Arrays: (D*D, N)."""
-    half = 0.5 * dt
-    for i in range(first, last):
-        if stress.shape[0] == 1:
-            after = stress[0, i] + half * rate[0, i]
-            predicted[0, i] = after + half * rate[0, i]
-            stress[0, i] = after
-        elif stress.shape[0] == 4:
-            turn = _rotation_2(rate, i, half)
-            change = _symmetric_2(rate, i, half)
-            after_2 = _turned_2(turn, _sum_2(_symmetric_2(stress, i, 1.0), change))
-            _write_2(predicted, i, _sum_2(_turned_2(turn, after_2), change))
-            _write_2(stress, i, after_2)
-        else:
-            rotation = _rotation_3(rate, i, half)
-            change_3 = _symmetric_3(rate, i, half)
-            after_3 = _turned_3(rotation, _sum_3(_symmetric_3(stress, i, 1.0), change_3))
-            _write_3(predicted, i, _sum_3(_turned_3(rotation, after_3), change_3))
-            _write_3(stress, i, after_3)
-    return 0.0
+@njit(**INLINED)
+def advance(dim, stress, velocity_gradient, div_v, stiffness, dt, i):
+    """Advance the deviatoric stress (D, D, N) of particle i by dt (eqs 430-431).
 
-
-@njit(**COMPILED)
-def correct_turned(first, last, dt, stress, rate, mass) -> float:
-    """Advance the stress by the second half step, with the new rate. Arrays: (D*D, N)."""
-    half = 0.5 * dt
-    for i in range(first, last):
-        if stress.shape[0] == 1:
-            stress[0, i] += half * rate[0, i]
-        elif stress.shape[0] == 4:
-            after_2 = _turned_2(_rotation_2(rate, i, half), _symmetric_2(stress, i, 1.0))
-            _write_2(stress, i, _sum_2(after_2, _symmetric_2(rate, i, half)))
-        else:
-            after_3 = _turned_3(_rotation_3(rate, i, half), _symmetric_3(stress, i, 1.0))
-            _write_3(stress, i, _sum_3(after_3, _symmetric_3(rate, i, half)))
-    return 0.0
-
-
-# Individual time steps are refused with this formulation, so the last two functions never run.
-JAUMANN = Rule(predict_turned, correct_turned, STRAIGHT.predict_each, STRAIGHT.correct_each)
+    velocity_gradient (D, D, N) and div_v (N,) are those in the middle of the step; stiffness: 2 G.
+    """
+    half = 0.5 * stiffness * dt
+    if len(dim) == 1:
+        stress[0, 0, i] += 2.0 * half * (velocity_gradient[0, 0, i] - div_v[i] / 3.0)
+    elif len(dim) == 2:
+        change = _strained_2(velocity_gradient, div_v[i], i, half)
+        turn = _rotation_2(velocity_gradient, i, dt)
+        _write_2(stress, i, _sum_2(_turned_2(turn, _sum_2(_of_2(stress, i), change)), change))
+    else:
+        change_3 = _strained_3(velocity_gradient, div_v[i], i, half)
+        turn_3 = _rotation_3(velocity_gradient, i, dt)
+        after = _turned_3(turn_3, _sum_3(_of_3(stress, i), change_3))
+        _write_3(stress, i, _sum_3(after, change_3))
 
 
 # --- two dimensions: a symmetric tensor is (xx, xy, yy), a rotation its cosine and sine ---
 
 
 @njit(**INLINED)
-def _symmetric_2(tensor, i, factor):
-    mixed = 0.5 * (tensor[1, i] + tensor[2, i])
-    return factor * tensor[0, i], factor * mixed, factor * tensor[3, i]
+def _of_2(tensor, i):
+    return tensor[0, 0, i], tensor[0, 1, i], tensor[1, 1, i]
+
+
+@njit(**INLINED)
+def _strained_2(L, divergence, i, factor):
+    """Return factor times the deviatoric rate of strain."""
+    third, mixed = divergence / 3.0, 0.5 * (L[0, 1, i] + L[1, 0, i])
+    return factor * (L[0, 0, i] - third), factor * mixed, factor * (L[1, 1, i] - third)
 
 
 @njit(**INLINED)
 def _write_2(tensor, i, s):
-    tensor[0, i], tensor[1, i], tensor[2, i], tensor[3, i] = s[0], s[1], s[1], s[2]
+    tensor[0, 0, i], tensor[0, 1, i], tensor[1, 0, i], tensor[1, 1, i] = s[0], s[1], s[1], s[2]
 
 
 @njit(**INLINED)
@@ -81,9 +55,11 @@ def _sum_2(a, b):
 
 
 @njit(**INLINED)
-def _rotation_2(rate, i, time):
-    angle = 0.5 * (rate[1, i] - rate[2, i]) * time
-    return np.cos(angle), np.sin(angle)
+def _rotation_2(L, i, time):
+    """Return cosine and sine of 2 arctan(x), x = half the spin times time (eq 431)."""
+    x = 0.25 * (L[0, 1, i] - L[1, 0, i]) * time
+    scale = 1.0 / (1.0 + x * x)
+    return (1.0 - x * x) * scale, 2.0 * x * scale
 
 
 @njit(**INLINED)
@@ -101,20 +77,26 @@ def _turned_2(turn, s):
 
 
 @njit(**INLINED)
-def _symmetric_3(tensor, i, factor):
-    half = 0.5 * factor
+def _of_3(t, i):
+    return t[0, 0, i], t[0, 1, i], t[0, 2, i], t[1, 1, i], t[1, 2, i], t[2, 2, i]
+
+
+@njit(**INLINED)
+def _strained_3(L, divergence, i, factor):
+    """Return factor times the deviatoric rate of strain."""
+    third, half = divergence / 3.0, 0.5 * factor
     return (
-        factor * tensor[0, i], half * (tensor[1, i] + tensor[3, i]),
-        half * (tensor[2, i] + tensor[6, i]), factor * tensor[4, i],
-        half * (tensor[5, i] + tensor[7, i]), factor * tensor[8, i],
+        factor * (L[0, 0, i] - third), half * (L[0, 1, i] + L[1, 0, i]),
+        half * (L[0, 2, i] + L[2, 0, i]), factor * (L[1, 1, i] - third),
+        half * (L[1, 2, i] + L[2, 1, i]), factor * (L[2, 2, i] - third),
     )  # fmt: skip
 
 
 @njit(**INLINED)
-def _write_3(tensor, i, s):
-    tensor[0, i], tensor[1, i], tensor[2, i] = s[0], s[1], s[2]
-    tensor[3, i], tensor[4, i], tensor[5, i] = s[1], s[3], s[4]
-    tensor[6, i], tensor[7, i], tensor[8, i] = s[2], s[4], s[5]
+def _write_3(t, i, s):
+    t[0, 0, i], t[0, 1, i], t[0, 2, i] = s[0], s[1], s[2]
+    t[1, 0, i], t[1, 1, i], t[1, 2, i] = s[1], s[3], s[4]
+    t[2, 0, i], t[2, 1, i], t[2, 2, i] = s[2], s[4], s[5]
 
 
 @njit(**INLINED)
@@ -123,19 +105,16 @@ def _sum_3(a, b):
 
 
 @njit(**INLINED)
-def _rotation_3(rate, i, time):
-    """Return exp(spin time) by Rodrigues' formula: I + (sin t/t) A + ((1 - cos t)/t^2) A^2."""
-    a = 0.5 * (rate[1, i] - rate[3, i]) * time
-    b = 0.5 * (rate[2, i] - rate[6, i]) * time
-    c = 0.5 * (rate[5, i] - rate[7, i]) * time
-    angle = larger(np.sqrt(a * a + b * b + c * c), SMALLEST_ANGLE)
-    s = np.sin(angle) / angle
-    k = np.sin(0.5 * angle) / angle
-    k = 2.0 * k * k
+def _rotation_3(L, i, time):
+    """Return (I - A)^-1 (I + A) = I + 2 (A + A^2)/(1 + |A|^2/2), A = half the spin times time."""
+    a = 0.25 * (L[0, 1, i] - L[1, 0, i]) * time
+    b = 0.25 * (L[0, 2, i] - L[2, 0, i]) * time
+    c = 0.25 * (L[1, 2, i] - L[2, 1, i]) * time
+    k = 2.0 / (1.0 + a * a + b * b + c * c)
     return (
-        (1.0 - k * (a * a + b * b), s * a - k * b * c, s * b + k * a * c),
-        (-s * a - k * b * c, 1.0 - k * (a * a + c * c), s * c - k * a * b),
-        (-s * b + k * a * c, -s * c - k * a * b, 1.0 - k * (b * b + c * c)),
+        (1.0 - k * (a * a + b * b), k * (a - b * c), k * (b + a * c)),
+        (-k * (a + b * c), 1.0 - k * (a * a + c * c), k * (c - a * b)),
+        (k * (a * c - b), -k * (c + a * b), 1.0 - k * (b * b + c * c)),
     )
 
 

@@ -2,12 +2,12 @@
 
 from sph.formulations.continuum.clamps import hold
 from sph.formulations.continuum.gradients import gradients
-from sph.formulations.continuum.material import stresses, yielded
+from sph.formulations.continuum.material import stresses
 from sph.formulations.continuum.rates import rates
 from sph.formulations.continuum.support import supports
 from sph.part import Pass
 
-MATTER = ("position", "predicted_velocity", "mass", "predicted_density", "support")
+MATTER = ("mass", "predicted_density", "support")
 CORRECTION = ("kernel_factor", "kernel_gradient", "kernel_matrix")
 STRAIN = ("velocity_gradient", "div_v")
 
@@ -34,47 +34,36 @@ def of(scheme) -> tuple[Pass, ...]:
             "density",
             "density",
             gradients,
-            MATTER,
+            ("position", "velocity", *MATTER, "density"),
             (*there(*CORRECTION), *STRAIN, "density_rate"),
+            takes_step=True,
         ),
         *[_law(one, there) for one in scheme.materials],
         Pass(
             "rates",
             "rates",
             rates,
-            (*MATTER, *there("sound_speed", "balsara", "pressure", "stress", *CORRECTION,
-                             "tension", "initial_support"), "velocity_gradient"),
+            ("position", "predicted_velocity", *MATTER,
+             *there("sound_speed", "balsara", "pressure", "stress", *CORRECTION, "tension",
+                    "initial_support")),
             ("acceleration", "energy_rate", "signal_speed"),
         ),
         *[clamps] * scheme.is_clamped,
-        *[_plastic_flow(one, there) for one in scheme.materials if one.yields],
     )  # fmt: skip
 
 
 def _law(material, there) -> Pass:
     """Return the pass of a material's laws."""
-    found = there("pressure", "stress", "sound_speed", "balsara", "stress_rate", "tension")
+    found = there("pressure", "stress", "sound_speed", "balsara", "tension")
+    evolved = there("deviatoric_stress", "plastic_strain")
     is_first = material.number == 0.0  # others complete its arrays
     return Pass(
         "gradients",
         "stress",
         stresses,
-        ("predicted_density", "predicted_energy", "support", *STRAIN,
-         *there("material", "plastic_strain")),
+        ("density", "density_rate", "predicted_energy", "support", *STRAIN, *there("material")),
         found if is_first else (),
-        there("predicted_stress") if is_first else (*there("predicted_stress"), *found),
+        evolved if is_first else (*evolved, *found),
         models=material,
+        takes_step=True,
     )  # fmt: skip
-
-
-def _plastic_flow(material, there) -> Pass:
-    """Return the pass after the correction of a material that yields."""
-    return Pass(
-        "correction",
-        "stress",
-        yielded,
-        ("internal_energy", *STRAIN, *there("material")),
-        updates=("deviatoric_stress", "plastic_strain"),
-        models=material,
-        at_start=False,
-    )

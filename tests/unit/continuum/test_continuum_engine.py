@@ -180,24 +180,17 @@ def expected_of(case, matter):
     scale = np.select(
         its, [pressure_of(one, matter.density, matter.energy)[2] for one in case.materials]
     )
-    G = now.shear_modulus
     matter_now = moving._replace(
         stress=stress, sound_speed=now.sound_speed, rest_density=matter.initial_density
     )
     rates = continuum.rates(case.dense_scene, matter_now)
-    L, L_scale = rates.velocity_gradient, rates.velocity_gradient_scale
     stress_scale = continuum.norm(now.deviator) + scale
     fields = {
         "support": (2 * case.dense_scene.lengths(matter.mass, matter.density), None),
         "pressure": (now.pressure, scale),
         "sound_speed": (now.sound_speed, None),
-        "predicted_stress": (now.deviator, stress_scale),
+        "deviatoric_stress": (now.deviator, stress_scale),
         "stress": (stress, stress_scale),
-        # the antisymmetric part of the rate holds the spin
-        "stress_rate": (
-            continuum.deviatoric_rate(L, G) + continuum.spin(L),
-            (1 + 4 * G) * L_scale,
-        ),
         "tension": (continuum.tensile_stress(case.dense_scene, stress), stress_scale),
         "div_v": (rates.divergence, rates.divergence_scale),
         "kernel_factor": (rates.normalisation, rates.normalisation),
@@ -238,10 +231,10 @@ def run_engine(case, matter, skin, threads, lanes=simd.DOUBLE):
     state = State.at_start(scene.fields, *given.particles)
     scene.formulation.start(state)  # the initial lengths
     state.density[:] = state.predicted_density[:] = matter.density
-    state.predicted_velocity[:] = matter.velocity
+    state.predicted_velocity[:] = state.velocity[:] = matter.velocity
     state.predicted_energy[:] = matter.energy
     if case.is_solid:
-        state.predicted_stress[:] = matter.deviator
+        state.deviatoric_stress[:] = matter.deviator
     if case.yields:
         state.plastic_strain[:] = matter.plastic_strain
     sweep = passes.Sweep(state, team, ordering.number_of_blocks(count), scene.formulation.models)
@@ -259,7 +252,7 @@ def run_engine(case, matter, skin, threads, lanes=simd.DOUBLE):
     for one in others:
         make(one, sweep, search, lanes)
     team.close()
-    names = {*written, *(["predicted_stress"] * case.is_solid), "support"} - {"support_before"}
+    names = {*written, *(["deviatoric_stress"] * case.is_solid), "support"} - {"support_before"}
     return matter, {name: getattr(state, name) for name in names}, widenings
 
 

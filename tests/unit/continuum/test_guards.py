@@ -61,7 +61,7 @@ def test_density_stays_positive_and_adds_no_energy():
     assert (density > 0.0).all()
     assert (full > 0.0).all()
     assert full[0, 1] == 3.0
-    assert density[0, 1] == 2.5
+    assert (density == 2.0).all()  # the rate in the middle of the step is not known yet
     assert DENSITY.correct(0, 2, 1.0, density, rate, np.ones(2)) == 0.0
     assert (density > 0.0).all()
     assert density[0, 1] == 3.0
