@@ -616,3 +616,9 @@ def test_fault_of_table_in_file_names_its_line(tmp_path):
     text = '[problem]\nname = "regions"\nboundary = "open"\n[problem.relax]\nresidual = 0.1\n'
     (message,) = errors(text, ["problem.relax.seed=1"], tmp_path / "x.toml")
     assert "x.toml, line 4: problem.relax needs" in message
+
+
+def test_fault_of_all_keys_does_not_name_one_override():
+    tables = {"problem": {"name": "particles", "n": 3}}
+    with pytest.raises(ConfigError, match=r"^the configuration: problem: n = 3: expected 4"):
+        config.from_tables(tables, ["problem.dimension=1"])
