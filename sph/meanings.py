@@ -27,6 +27,12 @@ def of_column(config, name: str) -> Quantity | None:
     return of_parts.get(name) or meaning(config.problem.quantities, name)
 
 
+def is_of_problem(config, name: str) -> bool:
+    """Return whether a column of the history is one of the problem (`Problem.diagnostics`)."""
+    of_parts = of_part_columns(config.physics.formulation)
+    return not any(name in known for known in (columns.OF_ALL, columns.OF_SOME, of_parts))
+
+
 @functools.cache
 def of_part_columns(formulation: str) -> Mapping[str, Quantity]:
     """Return the columns that a formulation and the parts that can join it declare."""

@@ -64,7 +64,7 @@ def check(config: Config, target: Path | None) -> None:
     if target is not None and is_same_path(path, target):
         raise ConfigError(
             f"report.reference = {path}: this is the directory that the run itself is to go to.\n"
-            "Try: another directory for the run, with -o."
+            "Try: another directory for the run, with -o (output=)."
         )
     fine = Reference(path).at(config.time.end)
     _check(config, fine.config, path, "this run")

@@ -1,8 +1,10 @@
 """A simulation of particles given as arrays, in memory."""
 
+import functools
+import inspect
 import math
 import weakref
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from contextlib import ExitStack
 from typing import Any, Literal
 
@@ -10,9 +12,11 @@ import numpy as np
 from pydantic import Field, PrivateAttr
 
 from sph import config as configuration
-from sph.api.concise import concise
+from sph.api.concise import Parameters, concise
 from sph.api.view import View
 from sph.clock import Clock
+from sph.config.errors import suggestion
+from sph.config.physics import every_key
 from sph.errors import ConfigError
 from sph.output.history import TEXT_COLUMNS
 from sph.problems import base
@@ -44,6 +48,30 @@ class _Arrays(base.Problem):
 
     def initial(self, eos: Any) -> base.InitialState:
         return self._start
+
+
+def _known_arguments(function: Callable[Parameters, None]) -> Callable[Parameters, None]:
+    """Let a call with an unknown argument end in a ConfigError that says what to write."""
+    valid = [name for name in inspect.signature(function).parameters if name != "self"]
+
+    @functools.wraps(function)
+    def checked(*arguments: Parameters.args, **named: Parameters.kwargs) -> None:
+        if unknown := next((name for name in named if name not in valid), None):
+            raise ConfigError(
+                f"sph.Simulation: {unknown} is not an argument; {_in_place_of(unknown, valid)}"
+            )
+        function(*arguments, **named)
+
+    return checked
+
+
+def _in_place_of(unknown: str, valid: list[str]) -> str:
+    """Return the end of a message on an argument with the name of a key, or a misspelt name."""
+    if unknown == "domain":
+        return "expected box=, the ends of the domain"
+    if unknown in every_key():
+        return f'expected physics={{"{unknown}": …}}'
+    return suggestion(unknown, valid)
 
 
 class Simulation(View):
@@ -78,6 +106,7 @@ class Simulation(View):
     """
 
     @concise
+    @_known_arguments
     def __init__(
         self,
         position: Any,

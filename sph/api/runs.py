@@ -2,12 +2,15 @@
 
 import logging
 import os
+import re
 import shutil
 import tempfile
 import weakref
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Literal
+
+import numpy as np
 
 from sph import config as configuration
 from sph import progress, runner
@@ -16,7 +19,7 @@ from sph.api.concise import concise
 from sph.api.results import Run
 from sph.api.view import View
 from sph.config import Config
-from sph.errors import Stopped
+from sph.errors import ConfigError, Stopped
 from sph.output.run_directory import RunDirectory
 from sph.scene import Scene
 from sph.simulation import Simulation as Engine
@@ -43,8 +46,8 @@ def run(
       docs/configuration.md; or the `config` of another run.
     overrides: keys to change, {"problem.n": 400} or ["problem.n=400"] as after --set.
     callback: called with the simulation (`View`) at t = 0 and after each checkpoint, or after each
-      time step if each = "step". If it returns False, the run stops with a checkpoint, and the
-      status "stopped".
+      time step if each = "step". If it returns False, of Python or NumPy, the run stops with a
+      checkpoint, and the status "stopped"; after None, as without `return`, it goes on.
     output: run directory, which must not hold a run unless `force` is true; if None, a temporary
       directory, which is removed once nothing refers to the returned run and its checkpoints.
     show_progress: show the progress on stderr, as `sph run` does. Otherwise notes, such as that
@@ -90,11 +93,15 @@ class _Scratch:
 
 def _resolved(config: Any, overrides: Sequence[str] | Mapping[str, Any]) -> Config:
     texts = configuration.as_overrides(overrides)
-    if isinstance(config, Config):
-        return config.override(texts)
-    if isinstance(config, Mapping):
-        return configuration.from_tables(config, texts)
-    return configuration.load(Path(config), texts)
+    try:
+        if isinstance(config, Config):
+            return config.override(texts)
+        if isinstance(config, Mapping):
+            return configuration.from_tables(config, texts)
+        return configuration.load(Path(config), texts)
+    except ConfigError as error:
+        error.args = (re.sub("^--set ", "overrides: ", str(error), flags=re.MULTILINE),)
+        raise
 
 
 class _Log(progress.Messages):
@@ -140,4 +147,7 @@ class _Watched(progress.Messages):
         """Call back. Return why the run is to stop, or None."""
         if self.callback is None:
             return None
-        return CALLBACK if self.callback(View(simulation)) is False else None
+        answer = self.callback(View(simulation))
+        if isinstance(answer, np.ndarray | np.generic) and answer.dtype == bool:
+            answer = bool(answer)  # `density.max() < 20` is no False of Python
+        return CALLBACK if answer is False else None

@@ -91,10 +91,17 @@ def from_tables(
 def as_overrides(overrides: Sequence[str] | Mapping[str, Any]) -> list[str]:
     """Return overrides `a.b=VALUE` of a mapping {"a.b": VALUE}, or those given.
 
-    None removes a key.
+    None removes a key. Raises ConfigError for a whole table, which would lose its other keys.
     """
     if not isinstance(overrides, Mapping):
         return [overrides] if isinstance(overrides, str) else list(overrides)
+    for key, one in overrides.items():
+        if key in _names() and isinstance(one, Mapping):
+            dotted_keys = ", ".join(f'"{key}.{name}": {value!r}' for name, value in one.items())
+            raise ConfigError(
+                f'overrides: "{key}" is a whole table; expected single keys, with a point. Try: '
+                f"{{{dotted_keys}}}"
+            )
     texts = {
         key: removal.NONE if one is None else value_text(_plain(one, (key,)))
         for key, one in overrides.items()

@@ -28,14 +28,21 @@ def gas_issues(found: dict[str, Section]) -> list[Issue]:
     from sph import eos
 
     problem, physics = found["problem"], found["physics"]
-    gas, key = physics.eos_model(), "gamma" if physics.eos is None else "eos"
+    gas, key = physics.eos_model(), _key_of_eos(physics)
     if problem.ideal_gas and not eos.is_ideal(gas):
         text = f"expected an ideal gas for {problem.name}"
     elif not getattr(gas, "gamma", 0.0) < problem.gamma_below:
         text = f"expected gamma below {problem.gamma_below:g} for {problem.name}"
     else:
         return []
-    return [Issue(("physics", key), f"= {value_text(getattr(physics, key))}: {text}")]
+    return [Issue(("physics", key), f"= {physics.shown(key)}: {text}")]
+
+
+def _key_of_eos(physics: Any) -> str:
+    """Return the key of [physics] that gives the equation of state."""
+    if physics.materials:
+        return "materials"
+    return "gamma" if physics.eos is None else "eos"
 
 
 def part_issues(found: dict[str, Section]) -> list[Issue]:

@@ -53,7 +53,7 @@ def wrong_value(path: Path, value: Any, annotation: Any, example: Any = None) ->
         hint = f'; did you mean "{close}"?'
     elif isinstance(value, float) and value.is_integer() and int in kinds:
         hint = _such_as(path, int(value))
-    elif isinstance(value, dict) and any(_is_list_of_tables(one) for one in kinds):
+    elif isinstance(value, dict) and any(is_list_of_tables(one) for one in kinds):
         hint = f". Try: [[{dotted(path)}]] for each, in place of [{dotted(path)}]"
     return Issue(path, f"= {_found(value)}: expected {describe(annotation)}{hint}")
 
@@ -123,7 +123,7 @@ def _choice(said: list[Any]) -> Any:
     return next((one for one in said if hasattr(one, "valid_names")), None)
 
 
-def _is_list_of_tables(bare: Any) -> bool:
+def is_list_of_tables(bare: Any) -> bool:
     return typing.get_origin(bare) is list and _is_table(_plain(typing.get_args(bare)[0])[0])
 
 

@@ -4,6 +4,7 @@ The class found is extended by the keys that record where it came from. Exceptio
 become errors that name file and line (`sph.config.reporting`).
 """
 
+import difflib
 import functools
 import hashlib
 import importlib.metadata
@@ -18,7 +19,7 @@ from typing import Any, ClassVar, Literal, TypeGuard
 from pydantic import Field, create_model
 
 from sph import registry
-from sph.config.reporting import check_signature, reported, reporting
+from sph.config.reporting import check_signature, definition, reported, reporting
 from sph.config.restarts import RECORDED
 from sph.config.sections import SECTIONS
 from sph.errors import DeclarationError
@@ -30,6 +31,10 @@ GROUP = "sph.problems"  # of entry points: NAME = "module" or "module:Class"
 
 # Keys that record the sources of a problem. A restart finds them anew and says what has changed.
 SOURCES = ("file_sha256", "package")
+
+# Likeness of names from which one is the other, misspelt: `exakt` of `exact` has 0.8. Helpers of
+# the problems of sph have at most 0.77, `units` of `in_units`.
+SIMILAR = 0.8
 
 
 class Outside(base.Problem):
@@ -153,6 +158,7 @@ def _extended(found: type[base.Problem], origin: str, **keys: Any) -> type[Outsi
     """Return a subclass with more keys, whose methods report errors (`reported`)."""
     _check_defaults(found, origin)
     _check_attributes(found, origin)
+    _check_methods(found, origin)
     made: Any = create_model("Problem", __base__=(found, Outside), __doc__=found.__doc__, **keys)
     made.origin, made.filled_in = origin, (*found.filled_in, *SOURCES)
     for name, ours in vars(base.Problem).items():
@@ -187,6 +193,27 @@ def _check_attributes(found: type[base.Problem], origin: str) -> None:
                     f"{origin}: {attribute} has {name!r}: {value!r}; expected a dictionary of "
                     f"{kind.__module__}.{kind.__name__} by name"
                 )
+
+
+def _check_methods(found: type[base.Problem], origin: str) -> None:
+    """Raise DeclarationError for a method whose name is a misspelt one of `base.Problem`.
+
+    Nothing would call it. Other methods are helpers.
+    """
+    kinds = (FunctionType, classmethod, staticmethod, property)
+    known = [name for name, one in vars(base.Problem).items() if isinstance(one, kinds)]
+    known = [name for name in known if not name.startswith("_")]
+    parent = next(one for one in found.__mro__ if one.__module__.startswith(f"{PACKAGE}."))
+    for name in sorted(set(dir(found)) - set(dir(parent))):
+        own = getattr_static(found, name)
+        if name.startswith("_") or not isinstance(own, kinds):
+            continue
+        if close := difflib.get_close_matches(name.lower(), known, n=1, cutoff=SIMILAR):
+            raise DeclarationError(
+                f"{definition(own, origin)}: Problem has a method `{name}`, which no problem "
+                f"has: did you mean {close[0]}?\n"
+                f"Try: {close[0]}, or _{name} for a function of your own."
+            )
 
 
 def validating(model: type) -> AbstractContextManager:

@@ -141,9 +141,11 @@ class Physics(Section):
         ]
 
     def shown(self, key: str) -> str:
-        """Return the value of a key as TOML."""
+        """Return the value of a key that is given as TOML."""
         value = getattr(self, key)
-        return value_text(value.choice() if isinstance(value, LabelledTable) else value)
+        if isinstance(value, LabelledTable):
+            return value_text(value.choice())
+        return value_text(self.model_dump(include={key}, exclude_none=True)[key])
 
 
 @functools.cache
@@ -176,6 +178,12 @@ def keys_of_other_formulations(raw: dict[str, Any]) -> dict[str, str]:
             of = f'to physics.formulation = "{name}"'
             found[key] = f"{found[key]} or {of}" if key in found else of
     return found
+
+
+def every_key() -> set[str]:
+    """Return the keys that [physics] has under any formulation."""
+    known = registry.names(FORMULATIONS, folders=True)
+    return {key for name in known for key in table(name).model_fields}
 
 
 def model_folders() -> dict[str, str]:

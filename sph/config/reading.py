@@ -44,7 +44,13 @@ class Source(NamedTuple):
     directory: str = ""  # of the file; "" is the current directory
 
     def place(self, path: Path) -> int | str:
-        """Return the origin of `path`, or of the innermost table around it that has one, else 0."""
+        """Return the origin of `path`, or of the innermost table around it that has one, else 0.
+
+        The origin of a table that only overrides of its keys made is the first of these.
+        """
+        if len(path) > 1 and path not in self.places:
+            inside = (one for one in self.places if one[: len(path)] == path)
+            path = next(inside, path)
         ends = range(len(path), 0, -1)
         return next((self.places[path[:end]] for end in ends if path[:end] in self.places), 0)
 
@@ -97,13 +103,27 @@ def _syntax_message(message: str, text: str, name: str) -> str:
     found = re.fullmatch(r"(.*) \(at line (\d+), column (\d+)\)", message, re.DOTALL)
     if found:
         line, column = int(found[2]), int(found[3])
-        rest = text.splitlines()[line - 1][column - 1 :] if line <= len(text.splitlines()) else ""
-        is_point = rest.startswith(".") or _POINT.match(rest)
-        hint = " (TOML needs digits on both sides of a point: 0.5)" if is_point else ""
+        there = text.splitlines()[line - 1] if line <= len(text.splitlines()) else ""
+        hint = _syntax_hint(there, column)
         return f"{name}, line {line}, column {column}: not valid TOML: {found[1]}{hint}"
     last = len(text.splitlines())
     return f"{name}, line {last}: not valid TOML: {message.removesuffix(' (at end of document)')}"
 
+
+def _syntax_hint(line: str, column: int) -> str:
+    """Return the end of a message on a line that is not valid TOML."""
+    rest = line[column - 1 :]
+    if rest.startswith(".") or _POINT.match(rest):
+        return " (TOML needs digits on both sides of a point: 0.5)"
+    header = _HEADER.fullmatch(line)
+    if header and header[1] in REPEATED:
+        return f". Try: [[problem.{header[1]}]] for each, in place of [problem.{header[1]}]"
+    return ""
+
+
+# Keys of [problem] of sph that are a table for each of several things, [[problem.KEY]].
+REPEATED = ("body", "region")
+_HEADER = re.compile(r"\s*\[+\s*problem\s*\.\s*(\w+)\s*\]+\s*(?:#.*)?")
 
 # A number without a digit before or after its point, which TOML does not know.
 _POINT = re.compile(r"[+-]?(\.\d+|\d+\.)([eE][+-]?\d+)?(?![\w.])")

@@ -6,6 +6,7 @@ import traceback
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from types import TracebackType
+from typing import Any
 
 from pydantic import ValidationError
 
@@ -47,7 +48,7 @@ def reporting(method: Callable, origin: str) -> Callable:
             fault = fault_of(self, found, *arguments, **named) if fault_of else ""
         if fault:
             raise DeclarationError(
-                f"{_definition(method, origin)}: {method.__name__} returned {fault}"
+                f"{definition(method, origin)}: {method.__name__} returned {fault}"
             )
         return found
 
@@ -62,14 +63,15 @@ def check_signature(method: Callable, ours: Callable, origin: str) -> None:
         own.bind(*names)
     except TypeError:
         raise DeclarationError(
-            f"{_definition(method, origin)}: {method.__name__} has the arguments "
+            f"{definition(method, origin)}: {method.__name__} has the arguments "
             f"({', '.join(own.parameters)}); expected def {method.__name__}({', '.join(names)})"
         ) from None
 
 
-def _definition(method: Callable, origin: str) -> str:
-    """Return the file, with the line where the method begins if it is in that file."""
-    code = inspect.unwrap(method).__code__
+def definition(method: Any, origin: str) -> str:
+    """Return the file, with the line where the method or property begins if it is in that file."""
+    function = getattr(method, "__func__", None) or getattr(method, "fget", None) or method
+    code = inspect.unwrap(function).__code__
     return f"{origin}, line {code.co_firstlineno}" if code.co_filename == origin else origin
 
 

@@ -70,12 +70,12 @@ class RunDirectory:
         run = cls(path, tuple(one for one in paths if not one.exists()))
         with explained(f"cannot write to {path}"):
             if run.path.exists() and not run.path.is_dir():
-                raise FileError(f"{path} is a file.\nTry: another directory, with -o.")
+                raise FileError(f"{path} is a file.\nTry: another directory, with -o (output=).")
             there = run.path.is_dir() and not _holds_nothing(run.path)
             if there and not _is_run(run):
                 raise FileError(
                     f"{path} is not a run directory, and it is not empty.\n"
-                    "Try: a new directory, with -o."
+                    "Try: a new directory, with -o (output=)."
                 )
             refuse_link(run._checkpoint_directory)
             run._checkpoint_directory.mkdir(parents=True, exist_ok=True)

@@ -1,5 +1,7 @@
 """Bodies: lattices that fit shapes, overlaps, and the problem that composes bodies."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -199,6 +201,7 @@ def test_particles_nearer_than_half_a_spacing_overlap(x, is_near):
 # --- the configuration ------------------------------------------------------------------------
 
 STEEL = 'eos = { name = "tait", rho_0 = 8.0, c_0 = 1.0 }'
+ROOT = Path(__file__).parents[2]
 METAL = STEEL + '\nstrength = { name = "elastic", shear_modulus = 1.0 }'
 DISC = 'shape = "disc"\ncentre = [0.0, 0.0]\nradius = 1.0'
 PLATE = 'shape = "box"\nlow = [1.2, -1.0]\nhigh = [1.6, 1.0]'
@@ -289,6 +292,34 @@ MATERIALS = f"[physics.materials.steel]\n{METAL}\n[physics.materials.water]\n{ST
 def test_material_that_does_not_fit_is_refused(messages, tmp_path, first, physics, key):
     with messages.raised(ConfigError, key):
         loaded(tmp_path, scene(f"{DISC}\n{first}", physics=physics))
+
+
+@pytest.mark.parametrize(
+    ("name", "key"),
+    [("uniform", 'formulation = "gas"'), ("uniform", ""), ("shock_tube", "C = 0.1")],
+    ids=["given", "default", "default beside another key"],
+)
+def test_materials_of_a_gas_are_refused(messages, tmp_path, name, key):
+    text = f'[problem]\nname = "{name}"\n[physics]\n{key}\n{MATERIALS}'
+    with messages.raised(ConfigError, "physics.formulation"):
+        loaded(tmp_path, text)
+
+
+def test_materials_of_bodies_of_gas_are_refused():
+    with pytest.raises(ConfigError, match='formulation = "gas": expected "continuum"'):
+        config.load(ROOT / "configs" / "bodies.toml", ["physics.formulation=gas"])
+
+
+def test_materials_of_a_problem_of_ideal_gas_are_refused(tmp_path):
+    text = '[problem]\nname = "noh"\n[physics]\nformulation = "continuum"\n' + MATERIALS
+    with pytest.raises(ConfigError, match=r"physics\.materials = .*expected an ideal gas for noh"):
+        loaded(tmp_path, text)
+
+
+def test_gamma_of_a_problem_of_solids_is_refused(messages, tmp_path):
+    text = '[problem]\nname = "elastic_bar"\n[physics]\ngamma = 1.4\n'
+    with messages.raised(ConfigError, "physics.gamma = 1.4"):
+        loaded(tmp_path, text)
 
 
 def test_initial_state_has_each_bodys_matter(tmp_path):

@@ -471,6 +471,30 @@ def test_wrong_class_attribute_is_refused(home, line, words):
         configuration.load(home / "clouds.toml")
 
 
+@pytest.mark.parametrize(
+    ("method", "close"),
+    [
+        ("def exakt(self): ...", "exact"),
+        ("def diagnostic(self): ...", "diagnostics"),
+        ("@property\n    def Clamps(self): ...", "clamps"),
+        ("@staticmethod\n    def inital(): ...", "initial"),
+    ],
+)
+def test_misspelt_method_is_refused_with_its_line(home, method, close):
+    (home / "clouds.py").write_text(f"{CLOUDS}\n    {method}\n")
+    line = len(CLOUDS.splitlines()) + 2
+    with pytest.raises(
+        ConfigError, match=f"line {line}: .* no problem has: did you mean {close}[?]"
+    ):
+        configuration.load(home / "clouds.toml")
+
+
+def test_methods_of_other_names_are_helpers(home):
+    helpers = ("def mass_at(self): ...", "def _exakt(self): ...", "def exact_density(self): ...")
+    (home / "clouds.py").write_text(CLOUDS + "".join(f"\n    {one}\n" for one in helpers))
+    assert configuration.load(home / "clouds.toml").problem.name == "clouds"
+
+
 def test_problem_of_package_sph_is_not_tried(monkeypatch):
     found = configuration.load(ROOT / "configs" / "sod.toml", ["problem.n=100"])
     simulation = SimpleNamespace(scene=Scene(found), particles=None)

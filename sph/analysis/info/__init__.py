@@ -155,6 +155,7 @@ def _columns(config: Config, rows: dict[str, np.ndarray]) -> list[Found]:
             {
                 "name": name,
                 "last": last if isinstance(last, str) else float(last),
+                "of_problem": meanings.is_of_problem(config, name),
                 "unit": meanings.unit_of(config, known) if known else None,
                 "meaning": known.help if known else None,
             }

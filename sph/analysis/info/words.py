@@ -27,6 +27,9 @@ def in_words(found: dict[str, Any]) -> str:
         lines += ["", *_time(found["time"])]
     lines += ["", *_errors(found)]
     lines += _figures(found["figures"])
+    if of_problem := [one for one in found.get("columns", ()) if one["of_problem"]]:
+        lines += ["", "Columns of the problem, in the last row of the history:"]
+        lines += [line for one in of_problem for line in _entry(one["name"], one["last"], one)]
     if "fields" in found:
         lines += ["", *_fields(found["fields"])]
     if found.get("left_out"):
@@ -137,15 +140,17 @@ def _figures(figures: Sequence[dict[str, Any]]) -> list[str]:
     for table, heading in HEADINGS.items():
         rows = [one for one in figures if one["name"].startswith(f"{table}.")]
         if rows:
-            lines += ["", f"{heading}:", *(line for one in rows for line in _figure(one))]
+            lines += ["", f"{heading}:"]
+            for one in rows:
+                lines += _entry(one["name"].partition(".")[2], one["value"], one)
     return lines
 
 
-def _figure(one: dict[str, Any]) -> list[str]:
+def _entry(name: str, value: float | None, one: dict[str, Any]) -> list[str]:
+    """Return a value with its unit and its meaning."""
     unit = f" {one['unit']}" if one["unit"] else ""
-    name = one["name"].partition(".")[2]
     meaning = one["meaning"] or "no meaning is declared: see the file of the problem"
-    return [f"  {name} = {number(one['value'])}{unit}", _wrapped(meaning, "      ")]
+    return [f"  {name} = {number(value)}{unit}", _wrapped(meaning, "      ")]
 
 
 def number(value: float | None) -> str:

@@ -41,6 +41,8 @@ def _without_sound(simulation, materials):
         else:
             what = f"is compressed beyond the densest state of {eos.name}"
             remedy = f"{SMALLER_STEPS}, a weaker impact, or another equation of state"
+    if not simulation.step:
+        remedy = "an initial state with another density or internal energy of this particle"
     what = f"particle {p.id[i]} {what}; {_state(rho, p, i)}"
     return faults.fault(simulation, what, remedy, int(p.id[i]))
 

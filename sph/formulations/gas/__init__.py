@@ -129,7 +129,7 @@ class Gas(Formulation):
     @classmethod
     def issues(cls, physics, problem):
         if physics.materials:
-            return [("materials", 'expected physics.formulation = "continuum"')]
+            return [("formulation", 'expected "continuum", which has physics.materials')]
         scheme = registry.model(SCHEMES, physics.scheme)
         eos = physics.eos_model()
         if eos.under_tension:

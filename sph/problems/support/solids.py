@@ -18,9 +18,11 @@ def check_single(physics) -> None:
     if physics.materials is not None:
         raise ValueError("physics.materials is given: expected one material in this problem")
     if not hasattr(physics.eos_model(), "rho_0"):
+        key = "gamma" if physics.eos is None else "eos"
         raise ValueError(
-            f"physics.eos = {physics.shown('eos')}: expected an equation of state of a solid or "
-            'liquid, with a density at rest rho_0. Try: "mie_gruneisen" or "tait"'
+            f"physics.{key} = {physics.shown(key)}: expected an equation of state of a solid or "
+            'liquid, with a density at rest rho_0. Try: physics.eos of the name "mie_gruneisen" or '
+            '"tait"'
         )
 
 

@@ -142,6 +142,10 @@ WRONG = {
     "key": ({"physics": {"alhpa": 1.0}}, "physics.alhpa is not a key of [physics]; did you mean"),
     "other": ({"others": {"densty": 1.0}}, "others has densty; the fields of this scene are id, "),
     "threads": ({"threads": 0}, "run.threads = 0: expected"),
+    "domain": ({"domain": [0, 1]}, "domain is not an argument; expected box=, the ends of"),
+    "gamma": ({"gamma": 1.4}, 'gamma is not an argument; expected physics={"gamma": …}'),
+    "solid": ({"strength": 1.4}, 'strength is not an argument; expected physics={"strength": …}'),
+    "misspelt": ({"velocities": 1.0}, "velocities is not an argument; did you mean velocity?"),
     "stepping": ({"stepping": "own"}, 'time.stepping = "own": expected "global"'),
 }
 
@@ -156,6 +160,12 @@ def test_wrong_arrays_and_keys_are_refused(name):
 def test_unphysical_state_raises_numerical_error():
     with pytest.raises(sph.NumericalError, match="internal energy"):
         sph.Simulation(**two_clouds(internal_energy=-1.0))
+
+
+def test_negative_energy_of_continuum_is_a_matter_of_the_initial_state():
+    clouds = two_clouds(internal_energy=-1.0, physics={"formulation": "continuum"})
+    with pytest.raises(sph.NumericalError, match="Try: an initial state with another density"):
+        sph.Simulation(**clouds, others={"density": 1.0})
 
 
 def test_failure_while_advancing_raises_numerical_error():

@@ -47,6 +47,11 @@ def test_problem_file_in_document_runs(tmp_path, monkeypatch):
     drawn = CliRunner().invoke(main, ["plot", "runs/my"])
     assert drawn.exit_code == 0, drawn.output
     assert 0.3 < run.history["highest_speed"].max() < 1.2
+    told = CliRunner().invoke(main, ["info", "runs/my"]).output.partition("Columns of the problem")
+    last = run.history["highest_speed"][-1]
+    words = f"highest_speed = {last:.6g} length time^-1\n      largest speed of a particle"
+    assert words in told[2]
+    assert "energy_drift =" not in told[2]
 
 
 def test_problem_file_with_exact_solution_in_document_runs(tmp_path, monkeypatch):

@@ -48,6 +48,21 @@ def test_overrides(overrides):
     assert run.summary["particles"] < 50
 
 
+@pytest.mark.parametrize(
+    ("overrides", "words"),
+    [
+        ({"problem": {"n": 1000}}, '"problem" is a whole table; expected single keys, with a point.'
+         ' Try: {"problem.n": 1000}'),
+        ({"problem.n": -3}, "problem.n=-3: problem.n = -3: expected a whole number"),
+        (["problem.n=-3"], "problem.n=-3: problem.n = -3: expected a whole number"),
+    ],
+)  # fmt: skip
+def test_messages_on_overrides_are_those_of_python(overrides, words):
+    with pytest.raises(sph.ConfigError) as caught:
+        sph.run(TUBE, overrides)
+    assert str(caught.value).startswith(f"overrides: {words}")
+
+
 def test_numpy_values_and_paths_in_dictionary(tmp_path):
     shutil.copy(ROOT / "docs" / "notebooks" / "two_clouds.py", tmp_path)
     tables = {
@@ -193,6 +208,17 @@ def test_callback_stops_run_which_can_be_continued(done, tmp_path, each, calls):
     subprocess.run(command, check=True, env=os.environ | {"PYTHONPATH": str(ROOT)}, timeout=120)
     if each == "output":  # else the last step before the stop is not cut short by an output
         assert sph.open(run.directory).checkpoints[-1].state_hash == done.checkpoints[-1].state_hash
+
+
+@pytest.mark.parametrize("answer", [np.False_, np.array(False)], ids=["scalar", "array"])
+def test_false_of_numpy_stops_run(answer):
+    run = sph.run(TUBE, callback=lambda one: answer, each="step")
+    assert (run.status, run.history["t"].size) == ("stopped", 2)
+
+
+@pytest.mark.parametrize("answer", [None, 0, 0.0, np.True_, np.float64(0.0)])
+def test_other_answers_let_run_go_on(answer):
+    assert sph.run(TUBE, callback=lambda one: answer).status == "done"
 
 
 def test_callback_that_stops_at_the_end_leaves_a_run_that_is_done():

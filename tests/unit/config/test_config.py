@@ -5,6 +5,8 @@ import re
 import pytest
 
 from sph import config, registry
+from sph.config import reading
+from sph.config.errors import is_list_of_tables
 from sph.errors import ConfigError, FileError
 from sph.model import parameters
 from sph.parts.viscosity import Viscosity, constant
@@ -574,3 +576,49 @@ def test_key_of_another_formulation_is_named(formulation, key, owner):
     assert only_error(text).endswith(
         f'physics.{key} is not a key of [physics]: {key} belongs to physics.formulation = "{owner}"'
     )
+
+
+# --- tables of several things -----------------------------------------------------------------
+
+
+@pytest.mark.parametrize("key", reading.REPEATED)
+@pytest.mark.parametrize(
+    ("first", "second"), [("[{}]", "[{}]"), ("[[{}]]", "[{}] # one"), ("[{}]", "[[ {} ]]")]
+)
+def test_table_given_twice_without_double_brackets(key, first, second):
+    headers = [one.format(f"problem.{key}") for one in (first, second)]
+    message = only_error("\n".join(headers))
+    assert message.startswith("x.toml, line 2, column ")
+    assert message.endswith(f". Try: [[problem.{key}]] for each, in place of [problem.{key}]")
+
+
+def test_table_given_twice_that_occurs_once():
+    assert "Try" not in only_error("[problem.relax]\n[problem.relax]")
+
+
+def test_keys_that_are_repeated_tables():
+    found = {
+        key
+        for name in registry.names("sph.problems")
+        for key, field in registry.load("sph.problems", name).Problem.model_fields.items()
+        if is_list_of_tables(field.annotation)
+    }
+    assert found == set(reading.REPEATED)
+
+
+def test_fault_of_table_that_an_override_makes_names_the_override():
+    text = '[problem]\nname = "regions"\nboundary = "open"\n'
+    message = only_error(text, ["problem.relax.seed=1"])
+    assert message.startswith("--set problem.relax.seed=1: problem.relax needs closed boundaries")
+
+
+def test_fault_of_table_in_file_names_its_line(tmp_path):
+    text = '[problem]\nname = "regions"\nboundary = "open"\n[problem.relax]\nresidual = 0.1\n'
+    (message,) = errors(text, ["problem.relax.seed=1"], tmp_path / "x.toml")
+    assert "x.toml, line 4: problem.relax needs" in message
+
+
+def test_fault_of_all_keys_does_not_name_one_override():
+    tables = {"problem": {"name": "particles", "n": 3}}
+    with pytest.raises(ConfigError, match=r"^the configuration: problem: n = 3: expected 4"):
+        config.from_tables(tables, ["problem.dimension=1"])
