@@ -862,7 +862,7 @@ def test_failure_of_first_evaluation_writes_offender_and_needs_no_force(tmp_path
     left = checkpoints.read(run.offenders)
     assert left.particles.id[0] == caught.value.particle
     assert left.config.problem == configuration.from_text(few).problem
-    with pytest.raises(FileError, match="it has no checkpoints"):
+    with pytest.raises(FileError, match="has no checkpoint"):
         go_on(run.path)
     # there was no run: nothing that would have to be replaced by force
     start(TUBE + "\n[physics]\nC = 0.3\n", tmp_path / "run")
