@@ -218,12 +218,12 @@ def _centred(L, B, M, half):
             B[a, b] = (1.0 if a == b else 0.0) - half * L[a, b]
     if D == 1:
         determinant = B[0, 0]
-        inverse = (1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+        adjugate = (1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     elif D == 2:
         determinant = B[0, 0] * B[1, 1] - B[0, 1] * B[1, 0]
-        inverse = (B[1, 1], -B[0, 1], -B[1, 0], B[0, 0], 0.0, 0.0, 0.0, 0.0, 0.0)
+        adjugate = (B[1, 1], -B[0, 1], -B[1, 0], B[0, 0], 0.0, 0.0, 0.0, 0.0, 0.0)
     else:
-        inverse = (
+        adjugate = (
             B[1, 1] * B[2, 2] - B[1, 2] * B[2, 1],
             B[0, 2] * B[2, 1] - B[0, 1] * B[2, 2],
             B[0, 1] * B[1, 2] - B[0, 2] * B[1, 1],
@@ -234,13 +234,13 @@ def _centred(L, B, M, half):
             B[0, 1] * B[2, 0] - B[0, 0] * B[2, 1],
             B[0, 0] * B[1, 1] - B[0, 1] * B[1, 0],
         )
-        determinant = B[0, 0] * inverse[0] + B[0, 1] * inverse[3] + B[0, 2] * inverse[6]
+        determinant = B[0, 0] * adjugate[0] + B[0, 1] * adjugate[3] + B[0, 2] * adjugate[6]
     is_regular = determinant > LEAST_VOLUME
     for a in range(D):
         for b in range(D):
             total = 0.0
             for c in range(D):
-                total += L[a, c] * inverse[c * D + b]
+                total += L[a, c] * adjugate[c * D + b]
             M[a, b] = total / determinant if is_regular else L[a, b]
 
 
